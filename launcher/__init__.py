@@ -1,0 +1,1 @@
+"""Launcher: scenarios, processes, simulation and review; the command line."""

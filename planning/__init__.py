@@ -1,0 +1,1 @@
+"""Planning: maps, convex cells, mutual visibility, deployments and paths, as functions of arrays."""

@@ -1,0 +1,1 @@
+"""Protocol: what the peers say to one another, and the buses that carry it."""
