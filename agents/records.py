@@ -1,0 +1,56 @@
+"""What goes into a recording: the values that roles and shells record, and that a review reads back.
+
+``Track`` is the truth about the peer that records it (each driver knows its own body); everything else is what the
+peer believed or decided at the time. Nothing here crosses the wire.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, TypeAlias
+
+import msgspec
+
+from protocol.messages import Deployment, Mode, Point, RoleName
+
+
+class Track(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag="track"):
+    """Where the recording peer truly is and what its body does; once per control period."""
+
+    role: RoleName
+    position: Point
+    velocity: Point
+    radius_m: float
+    mode: Mode
+    target: Point | None = None
+    path: tuple[Point, ...] = ()
+
+
+class Decision(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag="decision"):
+    """The leader has decided on a deployment (not on the repetitions of one)."""
+
+    deployment: Deployment
+    planning_s: float
+    """Time that the planning job took (modelled in simulation)."""
+    topology_changed: bool
+    """Whether the tree's edges differ from those of the decision before."""
+
+
+class Connectivity(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag="connectivity"):
+    """Who sees whom, by true line of sight between the positions that the recording peer (the leader) has heard."""
+
+    links: tuple[tuple[Point, Point], ...]
+    agent_visible: bool
+    chain_connected: bool
+    team_connected: bool
+    lambda2: float
+    """Second smallest eigenvalue of the Laplacian of the visibility graph of the whole team."""
+
+
+class LogLine(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag="log"):
+    """A sentence for the reviewer."""
+
+    level: Literal["debug", "info", "warning", "error"]
+    text: str
+
+
+AnyRecord: TypeAlias = Track | Decision | Connectivity | LogLine

@@ -1,0 +1,102 @@
+"""The seam between what a peer decides and where it runs: events and the time go in, effects come out.
+
+A :class:`Role` knows no socket, no clock, no thread and no file. :mod:`agents.shell` feeds it events and carries out
+its effects, live (:mod:`agents.runtime`) and in virtual time (``launcher.simulation``) alike, so the very same role
+objects run in both worlds. A role is deterministic: equal events at equal times give equal effects.
+
+Two more effects belong here and come with the election: ``Persist`` (a promise is on disk before it is said) and
+``Ask``/``Answer``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeAlias
+
+from agents.records import AnyRecord
+from protocol.bus import PeerAppeared, PeerVanished
+from protocol.keys import Address
+from protocol.messages import AnyBody, Envelope, Point
+
+
+@dataclass(frozen=True, slots=True)
+class Woken:
+    """The moment asked for with :class:`WakeAt` has come. ``position`` is where the driver says the body is."""
+
+    position: Point
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """A well-formed message arrived whose sender is the one its key names."""
+
+    address: Address
+    envelope: Envelope
+
+
+@dataclass(frozen=True, slots=True)
+class JobDone:
+    """A computation asked for with :class:`Compute` has ended: with a result, or with the text of its failure."""
+
+    job: str
+    result: Any
+    duration_s: float
+    failure: str = ""
+
+
+Event: TypeAlias = Woken | Heard | JobDone | PeerAppeared | PeerVanished
+
+
+@dataclass(frozen=True, slots=True)
+class Publish:
+    """Say this; the shell puts it in an envelope and finds the key."""
+
+    body: AnyBody
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """Set the driver's velocity, in metres per second."""
+
+    velocity: Point
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """Put this into the recording."""
+
+    record: AnyRecord
+
+
+@dataclass(frozen=True, slots=True)
+class WakeAt:
+    """Send :class:`Woken` at this mission time, in seconds. A later request replaces an earlier one."""
+
+    time_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Compute:
+    """Run a pure function beside the control loop; :class:`JobDone` carries the result back under the same name.
+
+    Live it runs in a worker thread, in simulation inline with a modelled delay. A role has one job of a name
+    under way at a time.
+    """
+
+    job: str
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...] = ()
+
+
+Effect: TypeAlias = Publish | Drive | Record | WakeAt | Compute
+
+
+class Role(Protocol):
+    """A peer's mind. Times are seconds of mission time (``run_time``), which starts at the launcher's epoch."""
+
+    def start(self, now_s: float, position: Point) -> Sequence[Effect]:
+        """First effects; must contain a :class:`WakeAt`."""
+
+    def handle(self, event: Event, now_s: float) -> Sequence[Effect]:
+        """Effects of one event. Never raises on what other peers say."""
