@@ -1,1 +1,49 @@
-"""Planning: maps, convex cells, mutual visibility, deployments and paths, as functions of arrays."""
+"""Planning: maps, convex cells, mutual visibility, deployments and paths, as functions of arrays.
+
+The public names are loaded when they are first used, so that a process that only asks for geodesics does not pay for
+the import of the decompositions.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from planning.decomposition import Cells, decompose
+    from planning.edge_weights import virtual_weights
+    from planning.environment import Environment
+    from planning.geodesic import GeodesicMap
+    from planning.mutual_visibility import mutual_visibility
+
+__all__ = [
+    "Cells",
+    "Environment",
+    "GeodesicMap",
+    "decompose",
+    "mutual_visibility",
+    "virtual_weights",
+]
+
+_HOMES = {
+    "Cells": "planning.decomposition",
+    "Environment": "planning.environment",
+    "GeodesicMap": "planning.geodesic",
+    "decompose": "planning.decomposition",
+    "mutual_visibility": "planning.mutual_visibility",
+    "virtual_weights": "planning.edge_weights",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name from its module (PEP 562)."""
+    if name not in _HOMES:
+        raise AttributeError(f"module 'planning' has no attribute {name!r}")
+    value = getattr(import_module(_HOMES[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """Public names, loaded or not."""
+    return sorted({*globals(), *__all__})

@@ -1,0 +1,65 @@
+"""The arrows of docs/architecture.md: who may import whom, read from the source."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+ALLOWED = {
+    "planning": {"planning"},
+    "estimation": {"estimation"},
+    "protocol": {"protocol"},
+    "maps": {"maps"},
+    "agents": {"agents", "planning", "estimation", "protocol"},
+    "launcher": {"launcher", "agents", "planning", "estimation", "protocol", "maps"},
+}
+GATES = {
+    "zenoh": {"protocol/zenoh_bus.py", "protocol/security.py"},
+    "rerun": {"agents/recorder.py", "launcher/review.py"},
+    "rerun_bindings": {"agents/recorder.py", "launcher/review.py"},
+}
+
+
+def imported(file: Path) -> Iterator[tuple[int, str]]:
+    """Line and top-level package of every import, however deep in the file it stands."""
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield node.lineno, alias.name.split(".")[0]
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{file}:{node.lineno}: write imports in full"
+            yield node.lineno, (node.module or "").split(".")[0]
+
+
+@pytest.mark.parametrize("package", sorted(ALLOWED))
+def test_packages_import_only_along_the_arrows(package: str) -> None:
+    files = sorted((ROOT / package).rglob("*.py"))
+    assert files, f"package {package} is missing"
+    for file in files:
+        for line, name in imported(file):
+            assert name not in ALLOWED or name in ALLOWED[package], f"{file}:{line}: {package} may not import {name}"
+            assert name != "tests", f"{file}:{line}: the product does not import its tests"
+
+
+@pytest.mark.parametrize("library", sorted(GATES))
+def test_sockets_and_recordings_have_one_door_each(library: str) -> None:
+    for package in ALLOWED:
+        for file in sorted((ROOT / package).rglob("*.py")):
+            place = file.relative_to(ROOT).as_posix()
+            if place not in GATES[library]:
+                for line, name in imported(file):
+                    assert name != library, f"{place}:{line}: only {sorted(GATES[library])} may import {library}"
+
+
+def test_roles_and_planners_know_no_clock_socket_or_thread() -> None:
+    pure = [*sorted((ROOT / "planning").glob("*.py")), *sorted((ROOT / "estimation").glob("*.py"))]
+    pure += [ROOT / "agents" / f"{name}.py" for name in ("role", "robot", "tracked_agent", "base_station", "leader")]
+    for file in pure:
+        for line, name in imported(file):
+            assert name not in {"time", "socket", "threading", "asyncio", "subprocess", "random"}, (
+                f"{file}:{line}: a pure core may not import {name}"
+            )
