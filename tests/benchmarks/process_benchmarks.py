@@ -1,0 +1,38 @@
+"""Whole processes, timed from outside: what a user waits for."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+
+def cases() -> Iterator[tuple[str, float, Callable[[], object]]]:
+    """Name, target in seconds, what to time."""
+    folder = Path(tempfile.mkdtemp(prefix="sightline-bench-"))
+    comb = folder / "comb.json"
+    comb.write_text(json.dumps(_comb(vertices=200)), encoding="utf-8")
+
+    def plan() -> None:
+        subprocess.run(
+            [sys.executable, "-m", "launcher.cli", "plan", str(comb), "--base", "1,1", "--agent", "47,1", "--json"],
+            check=True,
+            capture_output=True,
+        )
+
+    yield "sightline plan, 200 vertices, whole process", 2.0, plan
+
+
+def _comb(vertices: int) -> dict[str, object]:
+    """A corridor with niches: a rectilinear polygon with the given number of vertices, in metres."""
+    niches = (vertices - 4) // 4
+    ring = [[0.0, 0.0], [2.0 * niches + 2.0, 0.0], [2.0 * niches + 2.0, 3.0]]
+    for niche in reversed(range(niches)):
+        left, depth = 2.0 * niche + 1.0, 2.0 + math.fmod(0.37 * niche, 1.0)
+        ring += [[left + 1.0, 3.0], [left + 1.0, 3.0 + depth], [left, 3.0 + depth], [left, 3.0]]
+    ring.append([0.0, 3.0])
+    return {"name": "comb", "units": "metres", "outer": ring, "holes": []}
