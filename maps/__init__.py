@@ -18,5 +18,7 @@ def path(name: str) -> Path:
     Raises `ValueError` with the names there are when `name` is none of them.
     """
     if name not in names():
-        raise ValueError(f"there is no map '{name}': choose one of {', '.join(names())}, or give the path of a map file")
+        raise ValueError(
+            f"there is no map '{name}': choose one of {', '.join(names())}, or give the path of a map file"
+        )
     return _FOLDER / f"{name}.json"
