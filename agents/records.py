@@ -44,6 +44,9 @@ class Connectivity(msgspec.Struct, frozen=True, kw_only=True, tag_field="record"
     team_connected: bool
     lambda2: float
     """Second smallest eigenvalue of the Laplacian of the visibility graph of the whole team."""
+    tree_links: tuple[tuple[Point, Point], ...] = ()
+    """The links of the current deployment tree, between the same positions; those that are not among ``links`` (in
+    either order of the ends) are out of sight at the moment."""
 
 
 class LogLine(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag="log"):
