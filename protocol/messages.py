@@ -22,11 +22,14 @@ SCHEMA_VERSION: Final = 1
 MAXIMUM_PAYLOAD_BYTES = 1 << 20
 """Longer payloads are refused before they are parsed."""
 
-Point: TypeAlias = tuple[float, float]
-"""x, y in metres, map frame."""
+Coordinate: TypeAlias = Annotated[float, msgspec.Meta(ge=-1e7, le=1e7)]
+"""Bounded, so that no arithmetic on what others say overflows; JSON has neither NaN nor infinity."""
 
-Name: TypeAlias = Annotated[str, msgspec.Meta(pattern=r"^[a-z][a-z0-9_]{0,31}$")]
-"""A team's, peer's or operator's name: it is a chunk of a key."""
+Point: TypeAlias = tuple[Coordinate, Coordinate]
+"""x, y in metres, map frame; velocities in metres per second."""
+
+Name: TypeAlias = Annotated[str, msgspec.Meta(pattern=r"^(?!operator$)[a-z][a-z0-9_]{0,31}$(?!\n)")]
+"""A team's, peer's or operator's name: it is a chunk of a key (the same rule as :func:`protocol.keys.is_name`)."""
 
 Text: TypeAlias = Annotated[str, msgspec.Meta(max_length=500)]
 """A sentence for people."""
@@ -136,6 +139,9 @@ BODIES: dict[str, type[Body]] = {
     for body in (Heartbeat, State, Intent, Goal, GoalReply, Deployment)
 }
 """Kind → body."""
+
+PERIODIC_KINDS: Final = frozenset({"heartbeat", "state", "intent"})
+"""Kinds of which only the latest matters: it says all that the ones before said."""
 
 
 class Envelope(msgspec.Struct, frozen=True, kw_only=True):
