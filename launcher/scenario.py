@@ -1,0 +1,304 @@
+"""A scenario file: one TOML file that says which team does what, where. Every fault is one sentence.
+
+This module reads the file and checks what can be checked without the map; :mod:`launcher.preparation` holds it against
+the map and makes the :class:`~agents.mission.Mission`.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any, Literal, get_type_hints
+
+import msgspec
+from msgspec import Meta
+
+import maps
+from protocol.keys import is_name
+from protocol.messages import Point
+
+_PACKAGED = Path(__file__).parent / "scenarios"
+
+Metres = Annotated[float, Meta(gt=0, le=100)]
+Speed = Annotated[float, Meta(gt=0, le=100)]
+Rate = Annotated[float, Meta(ge=0.1, le=100)]
+Pause = Annotated[float, Meta(ge=0, le=86400)]
+Period = Annotated[float, Meta(gt=0, le=86400)]
+
+
+class ScenarioFault(ValueError):
+    """A scenario that cannot be run; the text says file, place and remedy in one sentence."""
+
+
+class _Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A table of the file; unknown keys are faults."""
+
+
+class Base(_Table, frozen=True, kw_only=True):
+    """``[base]``: the base station, which stands still."""
+
+    position: Point
+
+
+class Agent(_Table, frozen=True, kw_only=True):
+    """``[agent]``: the tracked agent and how it walks."""
+
+    start: Point
+    behaviour: Literal["script", "wander", "goals"] = "wander"
+    """``script``: the ``goals`` in order; ``wander``: it explores; ``goals``: it waits for ``sightline goal``."""
+    goals: tuple[Point, ...] = ()
+    pause_s: Pause = 2.0
+    start_after_s: Pause = 6.0
+    around_corner_share: Annotated[float, Meta(ge=0, le=1)] = 0.5
+    speed_m_s: Speed = 0.5
+    radius_m: Metres = 0.2
+
+
+class Robots(_Table, frozen=True, kw_only=True):
+    """``[robots]``: either ``count``, and they start around the base station, or their ``starts``."""
+
+    count: Annotated[int, Meta(ge=1, le=200)] | None = None
+    starts: tuple[Point, ...] = ()
+    speed_m_s: Speed = 1.0
+    radius_m: Metres = 0.2
+
+
+class Rates(_Table, frozen=True, kw_only=True):
+    """``[rates]``: control loop (and state messages), heartbeats."""
+
+    control_hz: Rate = 10.0
+    heartbeat_hz: Rate = 2.0
+
+
+class Planning(_Table, frozen=True, kw_only=True):
+    """``[planning]``: how the leader plans."""
+
+    decomposition: Literal["inflection", "aspect"] = "inflection"
+    period_s: Period = 0.5
+    valid_for_s: Period = 3.0
+
+
+class Network(_Table, frozen=True, kw_only=True):
+    """``[network]``: peer i listens on 127.0.0.1, port ``base_port + i``; without it, on free ports."""
+
+    base_port: Annotated[int, Meta(ge=1024, le=65000)] | None = None
+
+
+class Scenario(_Table, frozen=True, kw_only=True):
+    """The whole file."""
+
+    map: str
+    """A packaged map by its name, or a map file relative to the scenario file."""
+    base: Base
+    agent: Agent
+    robots: Robots
+    name: str = ""
+    """Name of team and run; the file's name when it is not given."""
+    duration_s: Period | None = None
+    """Without it the run lasts until Ctrl-C."""
+    seed: Annotated[int, Meta(ge=0, le=2**53)] = 0
+    rates: Rates = Rates()
+    planning: Planning = Planning()
+    network: Network = Network()
+
+    @property
+    def robot_count(self) -> int:
+        """How many robots the team has."""
+        return self.robots.count if self.robots.count is not None else len(self.robots.starts)
+
+
+_EXAMPLES = {
+    "map": 'map = "office"',
+    "base": "[base] with position = [2.0, 3.0]",
+    "base.position": "position = [2.0, 3.0]",
+    "agent": "[agent] with start = [3.0, 3.0]",
+    "agent.start": "start = [3.0, 3.0]",
+    "robots": "[robots] with count = 4",
+}
+_WORDS = {
+    "float": "a number", "int": "a whole number", "str": 'text in quotes', "array": "a list", "object": "a table",
+    "bool": "true or false", "null": "nothing",
+}  # fmt: skip
+
+
+def packaged() -> list[str]:
+    """Names of the scenarios that come with Sightline."""
+    return sorted(file.stem for file in _PACKAGED.glob("*.toml"))
+
+
+def find_scenario(name_or_path: str) -> Path:
+    """File of a packaged scenario, or the path itself.
+
+    Raises:
+        ScenarioFault: there is neither a file nor a packaged scenario of this name.
+    """
+    path = Path(name_or_path)
+    if path.is_file():
+        return path
+    if name_or_path in packaged():
+        return _PACKAGED / f"{name_or_path}.toml"
+    if path.is_dir():
+        raise ScenarioFault(f"{name_or_path} is a folder: name the scenario file (.toml) in it")
+    near = difflib.get_close_matches(name_or_path, packaged(), n=1)
+    hint = f"did you mean '{near[0]}'" if near else f"give a TOML file or one of {', '.join(packaged())}"
+    raise ScenarioFault(f"no scenario {name_or_path}: {hint}")
+
+
+def find_map(name_or_path: str, folder: Path, place: str = "") -> Path:
+    """File of a packaged map, or of a map file relative to ``folder``; ``place`` says who asks, for the fault.
+
+    Raises:
+        ScenarioFault: there is neither.
+    """
+    if name_or_path in maps.names():
+        return maps.path(name_or_path)
+    path = folder / name_or_path
+    if path.is_file():
+        return path
+    near = difflib.get_close_matches(name_or_path, maps.names(), n=1)
+    hint = f"did you mean '{near[0]}'" if near else f"give a map file or one of {', '.join(maps.names())}"
+    if path.is_dir():
+        hint = "that is a folder, name the map file in it"
+    raise ScenarioFault(f"{place}no map {name_or_path}: {hint}")
+
+
+def read_scenario(path: Path) -> Scenario:
+    """Scenario of a file, complete in itself, not yet held against the map.
+
+    Raises:
+        ScenarioFault: the file cannot be read, is no TOML, has a key or value that does not fit, or contradicts itself.
+    """
+    try:
+        raw = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as problem:
+        raise ScenarioFault(f"{path}: cannot be read ({problem.strerror}); give the path of a TOML file") from problem
+    except UnicodeDecodeError as problem:
+        raise ScenarioFault(f"{path}: is not text in UTF-8; save the scenario as UTF-8") from problem
+    except tomllib.TOMLDecodeError as problem:
+        said = str(problem)
+        raise ScenarioFault(f"{path}: is not valid TOML, {said[:1].lower()}{said[1:]}; mend that line") from problem
+    for place, number in _numbers(raw, ""):
+        if not math.isfinite(number):
+            raise ScenarioFault(f"{path}: {place} is {number}; give a finite number")
+    try:
+        scenario = msgspec.convert(raw, Scenario)
+    except msgspec.ValidationError as problem:
+        raise ScenarioFault(f"{path}: {_explain(str(problem))}") from problem
+    fault = _contradiction(scenario)
+    if fault:
+        raise ScenarioFault(f"{path}: {fault}")
+    return scenario if scenario.name else msgspec.structs.replace(scenario, name=_name_of(path))
+
+
+def _name_of(path: Path) -> str:
+    """A name from the file's: lower case, underscores, a letter first."""
+    name = re.sub(r"[^a-z0-9_]+", "_", path.stem.lower())[:32]
+    return name if is_name(name) else f"run_{name}"[:32]
+
+
+def _contradiction(scenario: Scenario) -> str:
+    """What contradicts itself, as a sentence; empty if nothing does."""
+    agent, robots = scenario.agent, scenario.robots
+    if scenario.name and not is_name(scenario.name):
+        return (
+            f"name '{scenario.name}' cannot name a team; "
+            "use at most 32 of a-z, 0-9 and _, a letter first, and not 'operator'"
+        )
+    if agent.behaviour == "script" and not agent.goals:
+        return "agent.behaviour is 'script' and there are no goals; add goals = [[x, y], ...] to [agent]"
+    if agent.behaviour != "script" and agent.goals:
+        return (
+            f"agent.goals are given and agent.behaviour is '{agent.behaviour}'; "
+            'set behaviour = "script" in [agent], or remove the goals'
+        )
+    if robots.count is None and not robots.starts:
+        return "[robots] says neither count nor starts; add count = 4, or starts = [[x, y], ...]"
+    if robots.count is not None and robots.starts and robots.count != len(robots.starts):
+        return (
+            f"robots.count is {robots.count} and robots.starts has {len(robots.starts)} places; remove one of the two"
+        )
+    if len(robots.starts) > 200:
+        return f"robots.starts has {len(robots.starts)} places; a team has at most 200 robots"
+    if scenario.planning.valid_for_s < 2 * scenario.planning.period_s:
+        return (
+            f"planning.valid_for_s ({scenario.planning.valid_for_s:g}) is less than two planning periods; "
+            f"make it at least {2 * scenario.planning.period_s:g}, or robots hold between two orders"
+        )
+    return ""
+
+
+def _numbers(value: Any, place: str) -> Iterator[tuple[str, float]]:
+    """Every float of a decoded file with its place."""
+    if isinstance(value, float):
+        yield place, value
+    elif isinstance(value, dict):
+        for key, item in value.items():
+            yield from _numbers(item, f"{place}.{key}" if place else key)
+    elif isinstance(value, list):
+        for index, item in enumerate(value):
+            yield from _numbers(item, f"{place}[{index}]")
+
+
+def _explain(message: str) -> str:
+    """A sentence with place and remedy for what msgspec says of a value that does not fit."""
+    what, _, where = message.partition(" - at `$")
+    place = where.rstrip("`").lstrip(".")
+    if unknown := re.fullmatch(r"Object contains unknown field `(.*)`", what):
+        return _unknown_key(unknown[1], place)
+    if missing := re.fullmatch(r"Object missing required field `(.*)`", what):
+        key = f"{place}.{missing[1]}" if place else missing[1]
+        return f"{key} is missing; add {_EXAMPLES[key]}"
+    if kinds := re.fullmatch(r"Expected `(.*)`, got `(.*)`", what):
+        wanted = " or ".join(_WORDS.get(kind, kind) for kind in kinds[1].split(" | ") if kind != "null")
+        got = _WORDS.get(kinds[2], f"a {kinds[2]}")
+        return f"{place} is {got}; it must be {wanted}{_like(place)}"
+    if length := re.fullmatch(r"Expected `array` of length 2, got (\d+)", what):
+        return f"{place} has {length[1]} numbers; a place is [x, y] in metres"
+    if enum := re.fullmatch(r"Invalid enum value '(.*)'", what):
+        choices = _choices(place)
+        near = difflib.get_close_matches(enum[1], choices, n=1)
+        hint = f"did you mean '{near[0]}'" if near else f"choose one of {', '.join(choices)}"
+        return f"{place} is '{enum[1]}'; {hint}"
+    if bound := re.fullmatch(r"Expected `(.*)` (>=|>|<=|<) (\S+)", what):
+        words = {">=": "at least", ">": "more than", "<=": "at most", "<": "less than"}
+        return f"{place} is out of range; it must be {words[bound[2]]} {float(bound[3]):g}"
+    return f"{place or 'the file'} does not fit: {what[:1].lower()}{what[1:]}"
+
+
+def _like(place: str) -> str:
+    """An example for a place or a list of places."""
+    if place.endswith(("position", "start", "]")):
+        return ", a place is [x, y] in metres"
+    return ", like [[x, y], [x, y]]" if place.endswith(("goals", "starts")) else ""
+
+
+def _table_at(place: str) -> type[msgspec.Struct]:
+    """Struct of the table at a place."""
+    table: type[msgspec.Struct] = Scenario
+    for key in filter(None, place.split(".")):
+        table = get_type_hints(table)[key]
+    return table
+
+
+def _choices(place: str) -> list[str]:
+    """What a key with fixed choices may be."""
+    table, _, key = place.rpartition(".")
+    return list(get_type_hints(_table_at(table))[key].__args__)
+
+
+def _unknown_key(key: str, place: str) -> str:
+    """A sentence for a key that is not known: the near one, or one of another table, or all there are."""
+    known = list(_table_at(place).__struct_fields__)
+    title = f"[{place}]" if place else "the top of the file"
+    near = difflib.get_close_matches(key, known, n=1)
+    if near:
+        return f"unknown key '{key}' in {title}; did you mean '{near[0]}'"
+    if not place:
+        homes = [name for name in known if key in getattr(get_type_hints(Scenario)[name], "__struct_fields__", ())]
+        if homes:
+            return f"unknown key '{key}' at the top of the file; it belongs into [{homes[0]}]"
+    return f"unknown key '{key}' in {title}; the keys there are {', '.join(known)}"
