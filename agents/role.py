@@ -57,9 +57,11 @@ class Publish:
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """Set the driver's velocity, in metres per second."""
+    """Move at this velocity, in metres per second, for at most so long; a later one replaces an earlier one."""
 
     velocity: Point
+    for_s: float = 0.5
+    """Then the body stands by itself, whatever has become of the mind."""
 
 
 @dataclass(frozen=True, slots=True)
