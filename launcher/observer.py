@@ -1,0 +1,170 @@
+"""The team as somebody sees it who only listens: who is up, what they do, whether the chain holds now.
+
+:class:`TeamView` is pure: envelopes and tokens go in, a :class:`Status` comes out. It needs no clock but the time that
+it is given.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from agents.mission import Mission
+from planning.environment import Environment
+from protocol.bus import BusEvent, PeerAppeared, PeerVanished, Received
+from protocol.keys import parse
+from protocol.messages import Deployment, Envelope, Heartbeat, Intent, MalformedMessage, Point, State, decode
+
+SILENT_AFTER_S = 2.0
+"""A peer that has said nothing for so long does not count as up, whatever its token says."""
+
+
+@dataclass(frozen=True, slots=True)
+class PeerStatus:
+    """One peer, as last heard."""
+
+    name: str
+    up: bool
+    mode: str
+    """As in the messages; ``starting`` before the first, ``lost`` when a peer that spoke is not up."""
+    position: Point | None
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """The team at one moment."""
+
+    peers: tuple[PeerStatus, ...]
+    goal: Point | None
+    """Where the agent says it goes."""
+    deployment: Deployment | None
+    """The leader's standing order."""
+    agent_visible: bool
+    """The base station or some robot that is up sees the agent."""
+    chain_connected: bool
+    """The agent is joined to the base station through robots that see one another; by true line of sight between the
+    positions heard, through the map's walls."""
+    links: int
+    """Pairs of the team that see each other."""
+
+    @property
+    def up(self) -> int:
+        """How many peers are up."""
+        return sum(peer.up for peer in self.peers)
+
+    @property
+    def relays(self) -> int:
+        """How many robots are vertices of the deployment."""
+        placements = self.deployment.placements if self.deployment else ()
+        return sum(not placement.spare for placement in placements)
+
+
+@dataclass
+class _Known:
+    heard_at_s: float = float("-inf")
+    spoke: bool = False
+    token: bool = False
+    mode: str = "starting"
+    position: Point | None = None
+    order: tuple[int, int] = (-1, -1)
+
+
+@dataclass
+class TeamView:
+    """What has been heard of a team."""
+
+    mission: Mission
+    environment: Environment
+    malformed: int = 0
+    """Messages that were no message of this schema, or not by the peer whose key they used."""
+    goal: Point | None = None
+    deployment: Deployment | None = None
+    _known: dict[str, _Known] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self._known = {entry.name: _Known() for entry in self.mission.roster}
+
+    def handle(self, event: BusEvent, now_s: float) -> None:
+        """Take in one event of the bus."""
+        match event:
+            case PeerAppeared(peer):
+                if peer in self._known:
+                    self._known[peer].token = True
+            case PeerVanished(peer):
+                if peer in self._known:
+                    self._known[peer].token = False
+            case Received(key, payload):
+                address = parse(key)
+                if address is None or address.operator:
+                    return
+                try:
+                    envelope = decode(payload)
+                except MalformedMessage:
+                    self.malformed += 1
+                    return
+                if envelope.sender != address.speaker or envelope.sender not in self._known:
+                    self.malformed += 1
+                    return
+                self._hear(envelope, now_s)
+
+    def _hear(self, envelope: Envelope, now_s: float) -> None:
+        known = self._known[envelope.sender]
+        order = (envelope.incarnation, envelope.sequence)
+        if order <= known.order:
+            return  # late or twice
+        known.order, known.heard_at_s, known.spoke, known.token = order, now_s, True, True
+        match envelope.body:
+            case Heartbeat(mode=mode):
+                known.mode = mode
+            case State(position=position, mode=mode):
+                known.position, known.mode = position, mode
+            case Intent(position=position, mode=mode, goal=goal):
+                known.position, known.mode, self.goal = position, mode, goal
+            case Deployment() as deployment:
+                if self.deployment is None or _later(deployment, self.deployment):
+                    self.deployment = deployment
+
+    def status(self, now_s: float) -> Status:
+        """The team now. O(n²) lines of sight for n peers."""
+        peers = tuple(self._peer(entry.name, now_s) for entry in self.mission.roster)
+        placed = [(peer.name, peer.position) for peer in peers if peer.up and peer.position is not None]
+        names = [name for name, _ in placed]
+        seen = np.zeros((0, 0), dtype=bool)
+        if placed:
+            seen = self.environment.visibility_matrix(np.array([position for _, position in placed]))
+        base, agent = self.mission.base_station.name, self.mission.tracked_agent.name
+        agent_visible = chain_connected = False
+        if agent in names:
+            j = names.index(agent)
+            agent_visible = bool(seen[j].sum() > 1)
+            chain_connected = base in names and bool(_reached(seen, names.index(base))[j])
+        return Status(
+            peers=peers,
+            goal=self.goal,
+            deployment=self.deployment,
+            agent_visible=agent_visible,
+            chain_connected=chain_connected,
+            links=int((seen.sum() - len(placed)) // 2),
+        )
+
+    def _peer(self, name: str, now_s: float) -> PeerStatus:
+        known = self._known[name]
+        up = known.spoke and known.token and now_s - known.heard_at_s < SILENT_AFTER_S
+        mode = known.mode if up or not known.spoke else "lost"
+        return PeerStatus(name, up, mode, known.position)
+
+
+def _later(new: Deployment, old: Deployment) -> bool:
+    return (new.authority.epoch, new.authority.sequence) > (old.authority.epoch, old.authority.sequence)
+
+
+def _reached(seen: np.ndarray, start: int) -> np.ndarray:
+    """Which peers are joined to ``start``: (n,) bool for seen (n, n) bool."""
+    reached = np.zeros(len(seen), dtype=bool)
+    reached[start] = True
+    while True:
+        wider = seen[reached].any(axis=0)
+        if (wider == reached).all():
+            return reached
+        reached = wider
