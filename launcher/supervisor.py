@@ -19,6 +19,7 @@ from pathlib import Path
 from time import monotonic
 
 from agents.mission import Mission
+from protocol.messages import Point
 
 RESTARTS = 3
 """A peer that crashes more often than this within :data:`STEADY_S` seconds is given up."""
@@ -50,12 +51,22 @@ class Peer:
 
 
 class Supervisor:
-    """The processes of a mission. Use it from one asyncio loop, in the main thread (the kernel ties peers to it)."""
+    """The processes of a mission. Use it from one asyncio loop, in the main thread (the kernel ties peers to it).
 
-    def __init__(self, mission: Mission, folder: Path, announce: Callable[[str], None]) -> None:
+    Args:
+        mission: with endpoints.
+        folder: of the run; holds ``mission.json``.
+        announce: is told in a sentence what becomes of peers.
+        find: where the body of a peer was last heard of; a mind that is restarted finds its body there.
+    """
+
+    def __init__(
+        self, mission: Mission, folder: Path, announce: Callable[[str], None], find: Callable[[str], Point | None]
+    ) -> None:
         self.peers = {entry.name: Peer(entry.name) for entry in mission.roster}
         self._folder = folder
         self._announce = announce
+        self._find = find
         self._stopping = asyncio.Event()
         self._watchers: list[asyncio.Task[None]] = []
 
@@ -87,6 +98,7 @@ class Supervisor:
 
     async def _spawn(self, peer: Peer) -> None:
         """Start a process for a peer's present incarnation."""
+        position = self._find(peer.name) if peer.incarnation else None
         peer.process = await asyncio.create_subprocess_exec(
             sys.executable,
             "-P",  # whatever folders the user's own folder holds, `agents` means ours
@@ -98,6 +110,7 @@ class Supervisor:
             str(peer.incarnation),
             "--launcher",
             str(os.getpid()),
+            *(() if position is None else ("--position", str(position[0]), str(position[1]))),
             stdin=asyncio.subprocess.DEVNULL,
             stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.STDOUT,

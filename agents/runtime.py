@@ -1,0 +1,208 @@
+"""One peer as a process: ``python -m agents.runtime MISSION.json NAME``. Started by the launcher's supervisor.
+
+One thread runs the role: it sleeps until the next message or wake-up, whichever comes first. Computations run in a
+second thread and come back as events. A third waits for the signal to end: it arms a watchdog that needs no Python
+lock, so that even a process whose main thread hangs is gone two seconds later. Should the launcher die, the kernel
+sends that signal.
+
+Little is imported before the peer is tied to its launcher; the rest follows in :func:`live`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ctypes
+import faulthandler
+import os
+import signal
+import sys
+import threading
+import time
+import traceback
+from collections.abc import Sequence
+from pathlib import Path
+from queue import SimpleQueue
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from agents.mission import Mission
+    from agents.records import AnyRecord
+    from agents.role import Compute, JobDone
+    from protocol.inbox import Inbox
+
+CLOSE_WITHIN_S: Final = 2.0
+"""From the signal to end until the process is gone, whatever hangs."""
+
+_PR_SET_PDEATHSIG = 1
+
+
+class Ending:
+    """The wish that this process end: SIGTERM, SIGINT, or the death of the launcher."""
+
+    def __init__(self) -> None:
+        self.wished = threading.Event()
+        self._inbox: Inbox[JobDone] | None = None
+        signals = {signal.SIGTERM, signal.SIGINT}
+        signal.pthread_sigmask(signal.SIG_BLOCK, signals)  # inherited by every later thread: only sigwait takes them
+        threading.Thread(target=self._wait, args=(signals,), name="signals", daemon=True).start()
+
+    def wakes(self, inbox: Inbox[JobDone]) -> None:
+        """Have the reader of this inbox woken when the wish comes."""
+        self._inbox = inbox
+        if self.wished.is_set():
+            inbox.wake()
+
+    def _wait(self, signals: set[signal.Signals]) -> None:
+        signal.sigwait(signals)
+        faulthandler.dump_traceback_later(CLOSE_WITHIN_S, exit=True)
+        self.wished.set()
+        if self._inbox is not None:
+            self._inbox.wake()
+
+
+class Worker:
+    """A thread beside the control loop that runs computations one after the other."""
+
+    def __init__(self, inbox: Inbox[JobDone]) -> None:
+        self._inbox = inbox
+        self._jobs: SimpleQueue[Compute] = SimpleQueue()
+        threading.Thread(target=self._run, name="worker", daemon=True).start()
+
+    def execute(self, compute: Compute) -> None:
+        """Queue a computation; its :class:`~agents.role.JobDone` goes to the inbox."""
+        self._jobs.put(compute)
+
+    def _run(self) -> None:
+        from agents.role import JobDone
+
+        while True:
+            compute = self._jobs.get()
+            begun_s = time.perf_counter()
+            result, failure = None, ""
+            try:
+                result = compute.function(*compute.arguments)
+            except Exception as problem:
+                traceback.print_exc()
+                failure = f"{type(problem).__name__}: {problem}"
+            self._inbox.put(JobDone(compute.job, result, time.perf_counter() - begun_s, failure))
+
+
+def tie_to(launcher: int) -> None:
+    """Have the kernel end this process with SIGTERM when its launcher dies, or end now if that has happened."""
+    libc = ctypes.CDLL(None, use_errno=True)
+    if libc.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0) != 0:
+        raise OSError(ctypes.get_errno(), "cannot tie this process to its launcher")
+    if os.getppid() != launcher:
+        os._exit(1)
+
+
+def live(mission: Mission, folder: Path, name: str, incarnation: int, ending: Ending) -> None:
+    """Be the peer until the end is wished for.
+
+    Args:
+        mission: whose roster holds ``name``.
+        folder: of the run; the map lies there, and the recording goes to ``recordings/`` in it.
+        name: of the peer.
+        incarnation: how many processes bore the name before.
+        ending: says when it is time.
+    """
+    from agents.casting import cast
+    from agents.recorder import RerunRecorder
+    from agents.records import LogLine
+    from agents.role import JobDone
+    from agents.shell import PeerShell
+    from planning.environment import Environment
+    from protocol.inbox import Inbox
+    from protocol.zenoh_bus import ZenohBus
+
+    epoch_monotonic_s = time.monotonic() - (time.time() - mission.epoch_unix_s)
+
+    def now() -> float:
+        # Mission time follows the monotonic clock from here on: a wall clock may be set while we drive.
+        return time.monotonic() - epoch_monotonic_s
+
+    environment = Environment.load(folder / mission.map_path)
+    role, driver = cast(mission, name, environment)
+    file = folder / "recordings" / f"{name}.{incarnation}.rrd"
+    recorder = RerunRecorder(file, team=mission.team, recording_id=folder.name, peer=name)
+
+    def record(time_s: float, what: AnyRecord) -> None:
+        recorder.record(time_s, name, what)
+        if isinstance(what, LogLine):
+            print(f"{time_s:8.3f} {what.level}: {what.text}", file=sys.stderr, flush=True)
+
+    inbox: Inbox[JobDone] = Inbox()
+    worker = Worker(inbox)
+    ending.wakes(inbox)
+    endpoints = [entry.endpoint for entry in mission.roster]
+    bus = ZenohBus.open(mission.team, name, mission.entry(name).endpoint, endpoints, inbox.put)
+    try:
+        shell = PeerShell(
+            role,
+            driver,
+            bus,
+            name=name,
+            team=mission.team,
+            incarnation=incarnation,
+            peers=[entry.name for entry in mission.roster],
+            now=now,
+            wall_clock=time.time,
+            record=record,
+            execute=worker.execute,
+        )
+        shell.start()
+        while not ending.wished.is_set():
+            for event in inbox.wait(shell.wake_at_s - now()):
+                if isinstance(event, JobDone):
+                    shell.finish(event)
+                else:
+                    shell.take(event)
+            if now() >= shell.wake_at_s:
+                shell.wake()
+    finally:
+        bus.close()
+        recorder.close()
+        if inbox.dropped:
+            print(f"{now():8.3f} {inbox.dropped} messages were dropped unread", file=sys.stderr)
+
+
+def _read_mission(file: Path, name: str, position: Sequence[float] | None) -> Mission:
+    """The mission of a file; the peer starts at ``position`` if that is given."""
+    from msgspec import json, structs
+
+    from agents.mission import Mission
+
+    mission = json.decode(file.read_bytes(), type=Mission)
+    if position is None:
+        return mission
+    x, y = position
+    moved = structs.replace(mission.entry(name), start=(x, y))
+    return structs.replace(mission, roster=tuple(moved if entry.name == name else entry for entry in mission.roster))
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Entry of the process."""
+    parser = argparse.ArgumentParser(prog="python -m agents.runtime", description="One peer of a mission.")
+    parser.add_argument("mission", type=Path, help="mission.json in the folder of a run")
+    parser.add_argument("name", help="of the peer, as on the roster")
+    parser.add_argument("--incarnation", type=int, default=0, help="how many processes bore the name before")
+    parser.add_argument("--launcher", type=int, help="process whose death ends this one")
+    parser.add_argument("--position", type=float, nargs=2, metavar=("X", "Y"), help="where its body is by now")
+    options = parser.parse_args(arguments)
+    ending = Ending()
+    if options.launcher is not None:
+        tie_to(options.launcher)
+    status = 0
+    try:
+        mission = _read_mission(options.mission, options.name, options.position)
+        live(mission, options.mission.parent, options.name, options.incarnation, ending)
+    except Exception:
+        traceback.print_exc()
+        status = 1
+    sys.stderr.flush()
+    # All is closed; the threads of the worker and of zenoh need not be waited for, and could not be relied on to end.
+    os._exit(status)
+
+
+if __name__ == "__main__":
+    main()
