@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,13 +21,15 @@ LONG_SIDE_PIXELS = 1600
 _SUPERSAMPLING = 2
 _MARGIN_PIXELS = 2
 
+OBSTACLE: Colour = (16, 18, 22)
+"""Colour of what is not free space; a view that shows the picture has the same background."""
 _FREE: Colour = (52, 58, 68)
 _CELL_TINTS: tuple[Colour, ...] = ((47, 53, 63), (52, 58, 68), (57, 64, 74), (50, 59, 66), (56, 60, 72))
 
 
 @dataclass(frozen=True, slots=True)
 class MapPicture:
-    """A PNG whose row 0 lies at the *lowest* y, with transparent obstacles, and where it belongs."""
+    """A PNG whose row 0 lies at the *lowest* y, and where it belongs."""
 
     png: bytes
     origin: tuple[float, float]
@@ -56,18 +58,14 @@ def draw_map(environment: Environment, cell_polygons: Sequence[Floats] = ()) -> 
         pixels = (np.asarray(ring) - origin) * (_SUPERSAMPLING / scale)
         return [(float(x), float(y)) for x, y in pixels]
 
-    image = Image.new("RGB", (width, height), _FREE)
+    image = Image.new("RGB", (width, height), OBSTACLE)
     brush = ImageDraw.Draw(image)
+    brush.polygon(in_pixels(environment.outer), fill=_FREE)
     for number, ring in enumerate(cell_polygons):
         brush.polygon(in_pixels(ring), fill=_CELL_TINTS[number % len(_CELL_TINTS)])
-
-    free: Any = Image.new("L", image.size, 0)
-    stencil = ImageDraw.Draw(free)
-    stencil.polygon(in_pixels(environment.outer), fill=255)
     for hole in environment.holes:
-        stencil.polygon(in_pixels(hole), fill=0)
+        brush.polygon(in_pixels(hole), fill=OBSTACLE)
 
-    image.putalpha(free)
     buffer = io.BytesIO()
     image.reduce(_SUPERSAMPLING).save(buffer, format="PNG")
     return MapPicture(buffer.getvalue(), (float(origin[0]), float(origin[1])), scale)
