@@ -1,8 +1,8 @@
 """What crosses the wire: one envelope, one tagged body per kind, JSON.
 
-An envelope says who speaks (``sender``, ``incarnation``), in which order (``sequence`` rises by one with every
-message of an incarnation, over all kinds) and when (``sent_at_s``, the sender's wall clock). Its body is one of
-the structs below; the tag ``kind`` is also the last chunk of the key (:mod:`protocol.keys`).
+An envelope says who speaks (``sender``, ``incarnation``), in which order (``sequence``) and when (``sent_at_s``). Its
+body is one of the structs below; the tag ``kind`` is also the last chunk of the key (:mod:`protocol.keys`). Kinds can
+overtake one another on the way, so that a reader tells old from new by (incarnation, sequence) within a kind.
 
 Positions are metres in the map frame. Unknown fields are ignored, so that a minor addition does not break an older
 reader; a change of meaning raises :data:`SCHEMA_VERSION`, and a reader refuses a schema that it does not know.
@@ -34,10 +34,17 @@ Name: TypeAlias = Annotated[str, msgspec.Meta(pattern=r"^(?!operator$)[a-z][a-z0
 Text: TypeAlias = Annotated[str, msgspec.Meta(max_length=500)]
 """A sentence for people."""
 
-Count: TypeAlias = Annotated[int, msgspec.Meta(ge=0, le=2**62)]
+Correlation: TypeAlias = Annotated[str, msgspec.Meta(min_length=1, max_length=64)]
+"""Chosen by who asks, different each time; an answer bears that of its question."""
+
+Count: TypeAlias = Annotated[int, msgspec.Meta(ge=0, le=2**53 - 1)]
+"""Bounded by what every JSON reader holds exactly."""
+
 Seconds: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0)]
+"""A duration."""
 
 RoleName: TypeAlias = Literal["base_station", "robot", "tracked_agent"]
+"""What a peer is."""
 
 Mode: TypeAlias = Literal["waiting", "moving", "arrived", "holding"]
 """What a peer's body does: it has no orders yet, drives, stands where it should, or its orders have run out."""
@@ -55,7 +62,7 @@ class Heartbeat(Body, frozen=True, kw_only=True, tag="heartbeat"):
 
 
 class State(Body, frozen=True, kw_only=True, tag="state"):
-    """Where a robot or the base station is and what it does. Sent at ``state_hz``."""
+    """Where a robot or the base station is and what it does. Sent at ``control_hz``."""
 
     position: Point
     velocity: Point
@@ -68,7 +75,7 @@ class State(Body, frozen=True, kw_only=True, tag="state"):
 
 
 class Intent(Body, frozen=True, kw_only=True, tag="intent"):
-    """What an *announcing* tracked agent tells of itself. Sent at ``state_hz``."""
+    """What an *announcing* tracked agent tells of itself. Sent at ``control_hz``."""
 
     position: Point
     velocity: Point
@@ -79,17 +86,16 @@ class Intent(Body, frozen=True, kw_only=True, tag="intent"):
 
 
 class Goal(Body, frozen=True, kw_only=True, tag="goal"):
-    """Go there. Said by an operator, under a key of the operator's own, to the tracked agent."""
+    """Go there. Said by an operator to the tracked agent, and again until it replies."""
 
     goal: Point
-    correlation: Annotated[str, msgspec.Meta(min_length=1, max_length=64)]
-    """Chosen by the asker; comes back in the reply."""
+    correlation: Correlation
 
 
 class GoalReply(Body, frozen=True, kw_only=True, tag="goal_reply"):
-    """The tracked agent's answer to a :class:`Goal`."""
+    """The tracked agent's answer to a :class:`Goal`; the same again if the goal is said again."""
 
-    correlation: Annotated[str, msgspec.Meta(max_length=64)]
+    correlation: Correlation
     accepted: bool
     reason: Text = ""
 
@@ -108,8 +114,8 @@ class Placement(msgspec.Struct, frozen=True, kw_only=True):
 
     robot: Name
     position: Point
-    cell: int | None = None
-    """Cell of the decomposition; None for a robot that is not part of the chain."""
+    cell: Count | None = None
+    """Cell of the decomposition; none for a robot that is not part of the chain."""
     spare: bool = False
     """A spare is no vertex of the deployment: it accompanies the agent until it is needed."""
 
@@ -148,9 +154,14 @@ class Envelope(msgspec.Struct, frozen=True, kw_only=True):
     """One message as it stands on the wire."""
 
     schema: Literal[1] = SCHEMA_VERSION
+    """Version of all that follows."""
     sender: Name
+    """The speaker that the key names."""
     incarnation: Count
+    """Greater than in the processes that bore this name before: a count of restarts, or the milliseconds since 1970
+    at which the sender began."""
     sequence: Count
+    """Rises by one with every message of an incarnation, over all kinds."""
     sent_at_s: float
     """Sender's wall clock, seconds since 1970-01-01 UTC (virtual seconds in simulation)."""
     body: AnyBody
