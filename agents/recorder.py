@@ -10,7 +10,7 @@ entity                  what is there
 ``world/map/...``       ``free`` (picture), ``cells``, ``walls``; static
 ``world/sight``         all lines of sight between peers
 ``world/chain/...``     links of the current deployment tree: ``in_sight``, ``broken``
-``world/peers/...``     ``<peer>/body`` (true disc and velocity), ``/trail``, ``/path``, ``/target``
+``world/peers/...``     ``<peer>/body`` (dot, true disc, velocity), ``/trail``, ``/path``, ``/target``
 ``tree``                the deployment tree as a graph, in columns by hops from the base station
 ``connected``           agent visible, chain connected, team connected: 0 or 1 each
 ``lambda2``             algebraic connectivity of the team's visibility graph
@@ -228,12 +228,11 @@ class RerunRecorder:
         if before is None:
             self._static(f"{home}/trail", rr.LineStrips2D.from_fields(colors=_faded(colour, 0x70), radii=-1.0))
             self._static(f"{home}/path", rr.LineStrips2D.from_fields(colors=colour, radii=-0.5))
-            self._static(f"{home}/target", rr.Ellipses2D.from_fields(colors=colour, line_radii=-0.75))
+            self._static(f"{home}/target", rr.Ellipses2D.from_fields(colors=_faded(colour, 0xA0), line_radii=-0.5))
             self._static(
                 f"{home}/body",
-                rr.Points2D.from_fields(
-                    colors=colour, radii=track.radius_m, labels=peer, show_labels=True, draw_order=30.0
-                ),
+                rr.Points2D.from_fields(colors=colour, radii=-4.0, labels=peer, show_labels=True, draw_order=30.0),
+                rr.Ellipses2D.from_fields(colors=colour, half_sizes=[(track.radius_m,) * 2], line_radii=-0.75),
                 rr.Arrows2D.from_fields(colors=colour, radii=-1.0),
             )
         self._gather(now_ns, f"{home}/body", _body_columns, track)
@@ -288,7 +287,11 @@ def _journal_columns(texts: list[str]) -> Iterable[Any]:
 def _body_columns(tracks: list[Track]) -> Iterable[Any]:
     positions = [track.position for track in tracks]
     velocities = [track.velocity for track in tracks]
-    return [*rr.Points2D.columns(positions=positions), *rr.Arrows2D.columns(origins=positions, vectors=velocities)]
+    return [
+        *rr.Points2D.columns(positions=positions),
+        *rr.Ellipses2D.columns(centers=positions),
+        *rr.Arrows2D.columns(origins=positions, vectors=velocities),
+    ]
 
 
 def _line_columns(lines: list[tuple[Point, ...]]) -> Iterable[Any]:
