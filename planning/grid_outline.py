@@ -133,7 +133,7 @@ def _simplified(rings: list[Integers], core: Integers, tolerance: float) -> list
     return np.split(alive, starts[1:-1])
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _cut_corners(
     points: Integers,
     before: Integers,
@@ -169,15 +169,15 @@ def _cut_corners(
     return removed
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _doubled_area(points: Integers, a: int, v: int, b: int) -> int:
     """Twice the signed area of the triangle of three points by number."""
-    return (points[v, 0] - points[a, 0]) * (points[b, 1] - points[a, 1]) - (points[v, 1] - points[a, 1]) * (
-        points[b, 0] - points[a, 0]
-    )
+    (x, y), (over, up), (across, rise) = points[a], points[v], points[b]
+    area: int = (over - x) * (rise - y) - (up - y) * (across - x)
+    return area
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _occupied(
     points: Integers, a: int, v: int, b: int, alive: Booleans, order: Integers, bucket_starts: Integers, columns: int
 ) -> bool:
