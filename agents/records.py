@@ -35,6 +35,13 @@ class Decision(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", ta
     """Whether the tree's edges differ from those of the decision before."""
 
 
+class Planned(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag="planned"):
+    """A planning job has ended, whatever came of it."""
+
+    planning_s: float
+    """Time that it took (modelled in simulation)."""
+
+
 class Connectivity(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag="connectivity"):
     """Who sees whom, by true line of sight between the positions that the recording peer (the leader) has heard."""
 
@@ -56,4 +63,4 @@ class LogLine(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag
     text: str
 
 
-AnyRecord: TypeAlias = Track | Decision | Connectivity | LogLine
+AnyRecord: TypeAlias = Track | Decision | Planned | Connectivity | LogLine

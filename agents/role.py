@@ -57,7 +57,10 @@ class Publish:
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """Move at this velocity, in metres per second, for at most so long; a later one replaces an earlier one."""
+    """Move at this velocity, in metres per second, for at most so long. A later one replaces an earlier one.
+
+    Counted from the moment of the :class:`Woken` that it answers, so that a leg ends where it was meant to.
+    """
 
     velocity: Point
     for_s: float = 0.5

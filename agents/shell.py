@@ -1,0 +1,197 @@
+"""Between a role and its world: decodes what arrives, carries out what the role wants, and survives both.
+
+The world (:mod:`agents.runtime`, ``launcher.simulation``) owns time, threads and the bus. It calls :meth:`PeerShell.start`
+once, then :meth:`~PeerShell.take` for every event of the bus, :meth:`~PeerShell.finish` for every computation that has
+ended, and :meth:`~PeerShell.wake` when :attr:`~PeerShell.wake_at_s` has come; all from one thread.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Collection, Sequence
+from typing import Final, Literal, TypeAlias
+
+from agents.driver import RobotDriver
+from agents.records import AnyRecord, LogLine
+from agents.role import Compute, Drive, Effect, Event, Heard, JobDone, Publish, Record, Role, WakeAt, Woken
+from protocol.bus import Bus, BusEvent, PeerAppeared, PeerVanished, Received
+from protocol.keys import Address, parse
+from protocol.messages import Envelope, Goal, MalformedMessage, decode, encode, kind_of
+
+RETRY_S: Final = 0.2
+"""A role that failed while it was awake, and so asked for no further wake-up, is woken again after this."""
+
+MAXIMUM_OPERATORS: Final = 64
+"""Operators remembered at a time. Their names are not on the roster, so that the memory must be bounded."""
+
+Refusal: TypeAlias = str
+"""Why a publication was not heard: ``foreign``, ``malformed``, ``impersonated``, ``stranger``, ``misplaced`` or ``stale``."""
+
+
+class PeerShell:
+    """One peer: a role, its body and its bus.
+
+    Args:
+        role: the mind.
+        driver: the body.
+        bus: open connection to the team.
+        name, team: of this peer; they make its keys.
+        incarnation: of this process; greater than those of the processes that bore the name before.
+        peers: names on the roster; what others say is not heard. Operators need not be on it.
+        now: mission time, seconds.
+        wall_clock: seconds since 1970 (virtual ones in simulation), for the envelopes.
+        record: puts a record of this peer into the recording: ``record(time_s, record)``.
+        execute: starts a computation, which is to end in :meth:`finish`. Must not call it before it returns.
+    """
+
+    def __init__(
+        self,
+        role: Role,
+        driver: RobotDriver,
+        bus: Bus,
+        *,
+        name: str,
+        team: str,
+        incarnation: int,
+        peers: Collection[str],
+        now: Callable[[], float],
+        wall_clock: Callable[[], float],
+        record: Callable[[float, AnyRecord], None],
+        execute: Callable[[Compute], None],
+    ) -> None:
+        self.wake_at_s = math.inf
+        """Mission time at which :meth:`wake` is due."""
+        self.refused: Counter[Refusal] = Counter()
+        """How many publications were not heard, by reason."""
+        self.faults = 0
+        """How many events the role failed on."""
+        self._role = role
+        self._driver = driver
+        self._bus = bus
+        self._name = name
+        self._team = team
+        self._incarnation = incarnation
+        self._peers = frozenset(peers)
+        self._now = now
+        self._wall_clock = wall_clock
+        self._record = record
+        self._execute = execute
+        self._sequence = 0
+        self._heard: dict[tuple[str, str], tuple[int, int]] = {}
+        self._operators: dict[tuple[str, str], tuple[int, int]] = {}
+        self._complained: set[tuple[str, Refusal]] = set()
+
+    def start(self) -> None:
+        """Let the role begin."""
+        now_s = self._now()
+        self._driver.advance(now_s)
+        self._carry_out(self._role.start(now_s, self._driver.pose()))
+
+    def take(self, event: BusEvent) -> None:
+        """Pass an event of the bus on to the role, if it is fit for it."""
+        if isinstance(event, Received):
+            verdict = self._examine(event)
+            if isinstance(verdict, Heard):
+                self._tell(verdict)
+            elif verdict:
+                self._refuse(event.key, verdict)
+        elif event.peer != self._name:
+            self._tell(event)
+
+    def finish(self, done: JobDone) -> None:
+        """Pass the end of a computation on to the role."""
+        self._tell(done)
+
+    def wake(self) -> None:
+        """Bring the body up to date and wake the role."""
+        self.wake_at_s = math.inf
+        self._driver.advance(self._now())
+        self._tell(Woken(self._driver.pose()))
+        if self.wake_at_s == math.inf:
+            self.wake_at_s = self._now() + RETRY_S
+
+    def _examine(self, publication: Received) -> Heard | Refusal:
+        """The message of a publication, or why it is refused; empty for one's own echo."""
+        address = parse(publication.key)
+        if address is None or address.team != self._team:
+            return "foreign"
+        if not address.operator and address.speaker == self._name:
+            return ""
+        if not address.operator and address.speaker not in self._peers:
+            return "stranger"
+        try:
+            envelope = decode(publication.payload)
+        except MalformedMessage:
+            return "malformed"
+        if envelope.sender != address.speaker:
+            return "impersonated"
+        if envelope.kind != address.kind or isinstance(envelope.body, Goal) is not address.operator:
+            return "misplaced"
+        return Heard(address, envelope) if self._is_news(address, envelope) else "stale"
+
+    def _is_news(self, address: Address, envelope: Envelope) -> bool:
+        """Whether this is later than all that the sender has said of this kind; remembers it if so."""
+        memory = self._operators if address.operator else self._heard
+        source, order = (address.speaker, address.kind), (envelope.incarnation, envelope.sequence)
+        if order <= memory.get(source, (-1, -1)):
+            return False
+        memory[source] = order
+        if len(self._operators) > MAXIMUM_OPERATORS:
+            del self._operators[next(iter(self._operators))]
+        return True
+
+    def _refuse(self, key: str, reason: Refusal) -> None:
+        """Count a refusal; the first of its reason and speaker, and not those without end, is logged."""
+        self.refused[reason] += 1
+        address = parse(key)
+        speaker = address.speaker if address is not None and address.speaker in self._peers else "others"
+        if reason not in ("foreign", "stale") and (speaker, reason) not in self._complained:
+            self._complained.add((speaker, reason))
+            self._log("warning", f"refused a {reason} message under {key[:200]}; further ones are only counted")
+
+    def _tell(self, event: Event) -> None:
+        """Give the role an event. Whatever it raises costs this event and nothing else."""
+        effects: Sequence[Effect] = ()
+        try:
+            effects = self._role.handle(event, self._now())
+        except Exception as problem:
+            self.faults += 1
+            self._log("error", f"failed on {_describe(event)}: {type(problem).__name__}: {problem}"[:500])
+        self._carry_out(effects)
+
+    def _carry_out(self, effects: Sequence[Effect]) -> None:
+        for effect in effects:
+            match effect:
+                case Publish(body):
+                    self._publish(Envelope(
+                        sender=self._name, incarnation=self._incarnation, sequence=self._sequence,
+                        sent_at_s=self._wall_clock(), body=body,
+                    ))
+                case Drive(velocity, for_s):
+                    self._driver.drive(velocity, for_s)
+                case Record(record):
+                    self._record(self._now(), record)
+                case WakeAt(time_s):
+                    self.wake_at_s = time_s
+                case Compute():
+                    self._execute(effect)
+
+    def _publish(self, envelope: Envelope) -> None:
+        self._sequence += 1
+        self._bus.publish(Address(self._team, self._name, kind_of(envelope.body)).key, encode(envelope))
+
+    def _log(self, level: Literal["warning", "error"], text: str) -> None:
+        self._record(self._now(), LogLine(level=level, text=text))
+
+
+def _describe(event: Event) -> str:
+    match event:
+        case Heard(_, envelope):
+            return f"{envelope.kind} of {envelope.sender}"
+        case JobDone(job):
+            return f"the end of {job}"
+        case PeerAppeared(peer) | PeerVanished(peer):
+            return f"the coming or going of {peer}"
+        case Woken():
+            return "waking up"

@@ -1,0 +1,155 @@
+"""The tracked agent: walks by itself or where an operator sends it, and announces position, goal and path.
+
+It is independent: nobody of the team tells it where to go, and it waits for nobody.
+
+=======  ====================================================
+waiting  has had no goal yet
+moving   on its geodesic to its goal
+arrived  rests at its goal
+=======  ====================================================
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final, Literal
+
+from agents.behaviour import Routine
+from agents.mission import Mission, OnDemand
+from agents.path_follower import STANDING, Leg, PathFollower, Routes, Unreachable
+from agents.records import LogLine, Track
+from agents.rhythm import EARLY_S, Rhythm
+from agents.role import Drive, Effect, Event, Heard, JobDone, PeerAppeared, PeerVanished, Publish, Record, WakeAt, Woken
+from planning.environment import Environment
+from protocol.messages import Goal, GoalReply, Heartbeat, Intent, Mode, Point
+
+REMEMBERED_GOALS: Final = 256
+"""Answers kept, so that a goal that is said again is answered again and not walked again."""
+
+NOTHING_TO_DO_S: Final = 1.0
+"""A behaviour that has no goal is asked again after this."""
+
+
+class TrackedAgent:
+    """Walks from goal to goal; a goal of an operator interrupts the behaviour, which goes on afterwards.
+
+    Args:
+        mission: rates, speed, radius and rests.
+        free: where its centre can be: the map inflated by its radius.
+        routes: geodesics of ``free``.
+        routine: where it goes by itself.
+    """
+
+    def __init__(self, mission: Mission, free: Environment, routes: Routes, routine: Routine) -> None:
+        self._mission = mission
+        self._free = free
+        self._routine = routine
+        self._follower = PathFollower(routes, mission.agent_speed_m_s)
+        behaviour = mission.behaviour
+        self._pause_s, self._idle_until_s = (
+            (0.0, 0.0) if isinstance(behaviour, OnDemand) else (behaviour.pause_s, behaviour.start_after_s)
+        )
+        self._ordered: Point | None = None
+        """Goal of an operator that is waiting to be taken up."""
+        self._on_order = False
+        """Whether the present goal is an operator's."""
+        self._answers: dict[tuple[str, str], GoalReply] = {}
+        self._mode: Mode = "waiting"
+        self._leg: Leg = STANDING
+        self._logs: list[Effect] = []
+
+    def start(self, now_s: float, position: Point) -> Sequence[Effect]:
+        """Begin the two rhythms: control with intent, and heartbeat."""
+        self._control = Rhythm(1.0 / self._mission.control_hz, now_s)
+        self._heartbeat = Rhythm(1.0 / self._mission.heartbeat_hz, now_s)
+        return self._live(now_s, position)
+
+    def handle(self, event: Event, now_s: float) -> Sequence[Effect]:
+        """Answer goals when they arrive; walk when woken."""
+        match event:
+            case Woken(position):
+                return self._live(now_s, position)
+            case Heard(address, envelope) if isinstance(envelope.body, Goal):
+                return self._answer(address.speaker, envelope.body, now_s)
+            case Heard() | JobDone() | PeerAppeared() | PeerVanished():
+                return ()
+
+    def _answer(self, operator: str, goal: Goal, now_s: float) -> Sequence[Effect]:
+        asked = (operator, goal.correlation)
+        known = self._answers.get(asked)
+        if known is not None:
+            return (Publish(known),)
+        x, y = goal.goal
+        if self._free.contains([goal.goal])[0]:
+            reply = GoalReply(correlation=goal.correlation, accepted=True)
+            log = Record(LogLine(level="info", text=f"{operator} sends it to ({x:.2f}, {y:.2f})"))
+            self._ordered = goal.goal
+        else:
+            reason = (
+                f"goal ({x:.2f}, {y:.2f}) lies outside the map or nearer than {self._mission.agent_radius_m:.2f} m to a "
+                "wall: choose a point in free space"
+            )
+            reply = GoalReply(correlation=goal.correlation, accepted=False, reason=reason)
+            log = Record(LogLine(level="warning", text=f"refused what {operator} asked: {reason}"))
+        self._answers[asked] = reply
+        if len(self._answers) > REMEMBERED_GOALS:
+            del self._answers[next(iter(self._answers))]
+        return (Publish(reply), log, WakeAt(now_s))
+
+    def _live(self, now_s: float, position: Point) -> Sequence[Effect]:
+        self._decide(now_s, position)
+        self._leg = self._follower.steer(position)
+        if self._mode == "moving" and self._follower.arrived:
+            self._rest(now_s)
+        effects, self._logs = self._logs, []
+        effects.append(Drive(self._leg.velocity, self._leg.lasts_s))
+        path, goal = self._follower.remaining(position), self._follower.target
+        if self._control.due(now_s):
+            effects.append(Publish(Intent(
+                position=position, velocity=self._leg.velocity, mode=self._mode, goal=goal, path=path
+            )))
+            effects.append(Record(Track(
+                role="tracked_agent", position=position, velocity=self._leg.velocity,
+                radius_m=self._mission.agent_radius_m, mode=self._mode, target=goal, path=path,
+            )))
+        if self._heartbeat.due(now_s):
+            effects.append(Publish(Heartbeat(role="tracked_agent", mode=self._mode)))
+        effects.append(WakeAt(self._next_wake_s(now_s)))
+        return effects
+
+    def _decide(self, now_s: float, position: Point) -> None:
+        """Take up an operator's goal at once, and the routine's next one when it is free and has rested."""
+        if self._ordered is not None:
+            goal, self._ordered, self._on_order = self._ordered, None, True
+            self._go(position, goal, now_s)
+        elif self._mode != "moving" and now_s >= self._idle_until_s - EARLY_S:
+            chosen = self._routine.choose(position)
+            if chosen is None:
+                self._idle_until_s = now_s + NOTHING_TO_DO_S
+            else:
+                self._on_order = False
+                self._go(position, chosen, now_s)
+
+    def _go(self, position: Point, goal: Point, now_s: float) -> None:
+        try:
+            self._follower.go(position, goal)
+            self._mode = "moving"
+        except Unreachable as problem:
+            self._log("warning", f"gives up goal ({goal[0]:.2f}, {goal[1]:.2f}): {problem}")
+            self._rest(now_s)
+            self._idle_until_s = now_s + NOTHING_TO_DO_S
+
+    def _rest(self, now_s: float) -> None:
+        self._mode = "arrived"
+        self._idle_until_s = max(self._idle_until_s, now_s + self._pause_s)
+        if not self._on_order:
+            self._routine.reached()
+
+    def _next_wake_s(self, now_s: float) -> float:
+        wake_s = min(self._control.next_s, self._heartbeat.next_s)
+        if self._mode == "moving":
+            return min(wake_s, now_s + self._leg.lasts_s)
+        return min(wake_s, max(self._idle_until_s, now_s))
+
+    def _log(self, level: Literal["info", "warning"], text: str) -> None:
+        self._logs.append(Record(LogLine(level=level, text=text)))
