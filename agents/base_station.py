@@ -1,7 +1,7 @@
 """The base station: the fixed end of the chain, and in this version the leader.
 
-It hears where robots and agent are, has deployments planned beside its control loop, and publishes them. A *decision* is a
-choice of links and relay places. While one stands it is repeated, with a rising authority sequence and the spares'
+It hears where robots and agent are, has deployments planned beside its control loop, and publishes them. A *decision*
+is a choice of links and relay places. While one stands it is repeated, with a rising authority sequence and the spares'
 places brought up to date; the decision's number rises only when links or relay places change.
 """
 
@@ -15,18 +15,26 @@ from typing import Final, Literal, Protocol
 import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
+from planning.connectivity import components, lambda2
 
 from agents.leader import Plan
 from agents.mission import Mission
 from agents.records import Connectivity, Decision, LogLine, Planned, Track
 from agents.rhythm import EARLY_S, Rhythm
-from agents.role import Compute, Effect, Event, Heard, JobDone, PeerAppeared, PeerVanished, Publish, Record, WakeAt, Woken
-from planning.connectivity import components, lambda2
+from agents.role import (
+    Compute,
+    Effect,
+    Event,
+    Heard,
+    JobDone,
+    Publish,
+    Record,
+    WakeAt,
+    Woken,
+)
 from planning.environment import Environment
+from protocol.bus import PeerAppeared, PeerVanished
 from protocol.messages import AnyBody, Authority, Deployment, Heartbeat, Intent, Mode, Placement, Point, State
-
-SILENT_S: Final = 1.0
-"""Who has not said where it is for so long is not counted on: another robot gets its place."""
 
 GRACE_S: Final = 1.5
 """The first deployment waits so long for robots that have not been heard yet."""
@@ -36,6 +44,11 @@ REPETITIONS: Final = 4
 
 PLANNING: Final = "planning"
 """Name of the planning job."""
+
+
+def silence_s(control_hz: float) -> float:
+    """Who has not said where it is for so long is not counted on: another robot gets its place."""
+    return max(1.0, 3.0 / control_hz)
 
 
 class Planner(Protocol):
@@ -58,8 +71,8 @@ class Known:
 class BaseStation:
     """Leads the team.
 
-    The epoch is the mission time, in milliseconds, at which this incarnation began: a base station that was started again
-    outranks what its predecessor said, without a file.
+    The epoch is the mission time, in milliseconds, at which this incarnation began: a base station that was started
+    again outranks what its predecessor said, without a file.
 
     Args:
         mission: roster, rates and periods.
@@ -75,7 +88,7 @@ class BaseStation:
         self._position = mission.base_station.start
         self._agent = mission.tracked_agent.name
         self._robots = tuple(robot.name for robot in mission.robots)
-        self._silent_s = max(SILENT_S, 3.0 / mission.control_hz)
+        self._silent_s = silence_s(mission.control_hz)
         self._known: dict[str, Known] = {}
         self._epoch = self._sequence = self._decisions = 0
         self._plan: Plan | None = None
@@ -166,15 +179,20 @@ class BaseStation:
         self._effects.append(Record(Planned(planning_s=done.duration_s)))
         plan, before = done.result, self._plan
         self._plan = plan
-        if before is not None and plan.serves != before.serves or before is None and not plan.serves:
+        if plan.serves != (before is None or before.serves):
             self._log("info" if plan.serves else "warning", plan.reason)
         decides = before is None or _choice(plan) != _choice(before)
-        if self._said is not None and not decides and plan.placements == before.placements:
+        if before is not None and not decides and plan.placements == before.placements:
             return
         self._decisions += decides
         deployment = Deployment(
-            authority=self._next_authority(), valid_for_s=self._mission.valid_for_s, decision=self._decisions,
-            placements=plan.placements, edges=plan.edges, cost=plan.cost, relays_needed=plan.relays_needed,
+            authority=self._next_authority(),
+            valid_for_s=self._mission.valid_for_s,
+            decision=self._decisions,
+            placements=plan.placements,
+            edges=plan.edges,
+            cost=plan.cost,
+            relays_needed=plan.relays_needed,
             reason=plan.reason[:500] if decides or self._said is None else self._said.reason,
         )
         if decides:
@@ -202,9 +220,15 @@ class BaseStation:
         still = (0.0, 0.0)
         self._effects += (
             Publish(State(position=self._position, velocity=still, mode=self._mode)),
-            Record(Track(
-                role="base_station", position=self._position, velocity=still, radius_m=self._mission.robot_radius_m, mode=self._mode
-            )),
+            Record(
+                Track(
+                    role="base_station",
+                    position=self._position,
+                    velocity=still,
+                    radius_m=self._mission.robot_radius_m,
+                    mode=self._mode,
+                )
+            ),
             Record(self._connectivity()),
         )
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from planning.geodesic import GeodesicMap
+
 from agents.base_station import BaseStation
 from agents.behaviour import begin
 from agents.driver import DiscDriver
@@ -11,7 +13,6 @@ from agents.robot import Robot
 from agents.role import Role
 from agents.tracked_agent import TrackedAgent
 from planning.environment import Environment
-from planning.geodesic import GeodesicMap
 from protocol.messages import Point
 
 CLEARANCE_M = 1e-3
@@ -56,8 +57,12 @@ class Casting:
     def _planner(self) -> DeploymentPlanner:
         mission = self._mission
         return DeploymentPlanner(
-            self._environment, mission.base_station.start, mission.robot_radius_m, mission.decomposition,
-            base_name=mission.base_station.name, agent_name=mission.tracked_agent.name,
+            self._environment,
+            mission.base_station.start,
+            mission.robot_radius_m,
+            mission.decomposition,
+            base_name=mission.base_station.name,
+            agent_name=mission.tracked_agent.name,
         )
 
     def _free(self, radius_m: float, start: Point) -> Environment:

@@ -23,7 +23,7 @@ class RobotDriver(Protocol):
         """Where the body is: metres, map frame."""
 
     def drive(self, velocity: Point, for_s: float) -> None:
-        """Move at ``velocity`` (m/s, map frame) for at most ``for_s``, then stand: a mind that hangs must not drive on."""
+        """Move at ``velocity`` (m/s, map frame) for at most ``for_s``, then stand: a mind that hangs drives nobody on."""
 
 
 class DiscDriver:
@@ -69,7 +69,7 @@ class DiscDriver:
 
 
 def _last_visible(free: Environment, start: Point, end: Point) -> Point:
-    """Farthest point that ``start`` sees on the way to an ``end`` that it does not see, by bisection to 2⁻³² of the way."""
+    """Farthest point that ``start`` sees on the way to an ``end`` that it does not see, to 2⁻³² of the way."""
     near, far = 0.0, 1.0
     for _ in range(32):
         middle = 0.5 * (near + far)

@@ -17,7 +17,8 @@ from agents.mission import Mission
 from agents.path_follower import STANDING, Leg, PathFollower, Routes, Unreachable
 from agents.records import LogLine, Track
 from agents.rhythm import EARLY_S, Rhythm
-from agents.role import Drive, Effect, Event, Heard, JobDone, PeerAppeared, PeerVanished, Publish, Record, WakeAt, Woken
+from agents.role import Drive, Effect, Event, Heard, JobDone, Publish, Record, WakeAt, Woken
+from protocol.bus import PeerAppeared, PeerVanished
 from protocol.messages import Deployment, Heartbeat, Mode, Placement, Point, State
 
 
@@ -81,14 +82,31 @@ class Robot:
         path = self._follower.remaining(position)
         target = self._follower.target
         if self._control.due(now_s):
-            effects.append(Publish(State(
-                position=position, velocity=self._leg.velocity, mode=self._mode, target=target, path=path,
-                obeying=self._orders.authority if self._orders is not None else None,
-            )))
-            effects.append(Record(Track(
-                role="robot", position=position, velocity=self._leg.velocity, radius_m=self._mission.robot_radius_m,
-                mode=self._mode, target=target, path=path,
-            )))
+            effects.append(
+                Publish(
+                    State(
+                        position=position,
+                        velocity=self._leg.velocity,
+                        mode=self._mode,
+                        target=target,
+                        path=path,
+                        obeying=self._orders.authority if self._orders is not None else None,
+                    )
+                )
+            )
+            effects.append(
+                Record(
+                    Track(
+                        role="robot",
+                        position=position,
+                        velocity=self._leg.velocity,
+                        radius_m=self._mission.robot_radius_m,
+                        mode=self._mode,
+                        target=target,
+                        path=path,
+                    )
+                )
+            )
         if self._heartbeat.due(now_s):
             effects.append(Publish(Heartbeat(role="robot", mode=self._mode)))
         effects.append(WakeAt(self._next_wake_s(now_s)))

@@ -1,8 +1,9 @@
 """Between a role and its world: decodes what arrives, carries out what the role wants, and survives both.
 
-The world (:mod:`agents.runtime`, ``launcher.simulation``) owns time, threads and the bus. It calls :meth:`PeerShell.start`
-once, then :meth:`~PeerShell.take` for every event of the bus, :meth:`~PeerShell.finish` for every computation that has
-ended, and :meth:`~PeerShell.wake` when :attr:`~PeerShell.wake_at_s` has come; all from one thread.
+The world (:mod:`agents.runtime`, ``launcher.simulation``) owns time, threads and the bus. It calls
+:meth:`PeerShell.start` once, then :meth:`~PeerShell.take` for every event of the bus, :meth:`~PeerShell.finish` for
+every computation that has ended, and :meth:`~PeerShell.wake` when :attr:`~PeerShell.wake_at_s` has come; all from one
+thread.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ MAXIMUM_OPERATORS: Final = 64
 """Operators remembered at a time. Their names are not on the roster, so that the memory must be bounded."""
 
 Refusal: TypeAlias = str
-"""Why a publication was not heard: ``foreign``, ``malformed``, ``impersonated``, ``stranger``, ``misplaced`` or ``stale``."""
+"""Why a publication was not heard: it is foreign, malformed, impersonated, misplaced or stale, or of a stranger."""
 
 
 class PeerShell:
@@ -164,10 +165,15 @@ class PeerShell:
         for effect in effects:
             match effect:
                 case Publish(body):
-                    self._publish(Envelope(
-                        sender=self._name, incarnation=self._incarnation, sequence=self._sequence,
-                        sent_at_s=self._wall_clock(), body=body,
-                    ))
+                    self._publish(
+                        Envelope(
+                            sender=self._name,
+                            incarnation=self._incarnation,
+                            sequence=self._sequence,
+                            sent_at_s=self._wall_clock(),
+                            body=body,
+                        )
+                    )
                 case Drive(velocity, for_s):
                     self._driver.drive(velocity, for_s)
                 case Record(record):

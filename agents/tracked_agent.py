@@ -19,8 +19,9 @@ from agents.mission import Mission, OnDemand
 from agents.path_follower import STANDING, Leg, PathFollower, Routes, Unreachable
 from agents.records import LogLine, Track
 from agents.rhythm import EARLY_S, Rhythm
-from agents.role import Drive, Effect, Event, Heard, JobDone, PeerAppeared, PeerVanished, Publish, Record, WakeAt, Woken
+from agents.role import Drive, Effect, Event, Heard, JobDone, Publish, Record, WakeAt, Woken
 from planning.environment import Environment
+from protocol.bus import PeerAppeared, PeerVanished
 from protocol.messages import Goal, GoalReply, Heartbeat, Intent, Mode, Point
 
 REMEMBERED_GOALS: Final = 256
@@ -86,8 +87,8 @@ class TrackedAgent:
             self._ordered = goal.goal
         else:
             reason = (
-                f"goal ({x:.2f}, {y:.2f}) lies outside the map or nearer than {self._mission.agent_radius_m:.2f} m to a "
-                "wall: choose a point in free space"
+                f"goal ({x:.2f}, {y:.2f}) lies outside the map or nearer than {self._mission.agent_radius_m:.2f} m "
+                "to a wall: choose a point in free space"
             )
             reply = GoalReply(correlation=goal.correlation, accepted=False, reason=reason)
             log = Record(LogLine(level="warning", text=f"refused what {operator} asked: {reason}"))
@@ -105,13 +106,22 @@ class TrackedAgent:
         effects.append(Drive(self._leg.velocity, self._leg.lasts_s))
         path, goal = self._follower.remaining(position), self._follower.target
         if self._control.due(now_s):
-            effects.append(Publish(Intent(
-                position=position, velocity=self._leg.velocity, mode=self._mode, goal=goal, path=path
-            )))
-            effects.append(Record(Track(
-                role="tracked_agent", position=position, velocity=self._leg.velocity,
-                radius_m=self._mission.agent_radius_m, mode=self._mode, target=goal, path=path,
-            )))
+            effects.append(
+                Publish(Intent(position=position, velocity=self._leg.velocity, mode=self._mode, goal=goal, path=path))
+            )
+            effects.append(
+                Record(
+                    Track(
+                        role="tracked_agent",
+                        position=position,
+                        velocity=self._leg.velocity,
+                        radius_m=self._mission.agent_radius_m,
+                        mode=self._mode,
+                        target=goal,
+                        path=path,
+                    )
+                )
+            )
         if self._heartbeat.due(now_s):
             effects.append(Publish(Heartbeat(role="tracked_agent", mode=self._mode)))
         effects.append(WakeAt(self._next_wake_s(now_s)))

@@ -42,7 +42,7 @@ class Wanderer:
         return goal
 
     def _around_a_corner(self, position: Point) -> Point | None:
-        """A place that some corner in sight sees and the position does not: a corner at random, then a place at random."""
+        """A place that some corner in sight sees and the position does not: a random place by a random corner."""
         corners = self._free.reflex_vertices
         if len(corners) == 0:
             return None
