@@ -14,7 +14,7 @@ entity                  what is there
 ``tree``                the deployment tree as a graph, in columns by hops from the base station
 ``connected``           agent visible, chain connected, team connected: 0 or 1 each
 ``lambda2``             algebraic connectivity of the team's visibility graph
-``planning_ms``         how long each decision took
+``planning_ms``         how long each planning job took
 ``mode/<peer>``         what the peer's body does
 ``log/<peer>``          log lines, and the leader's decisions with their reasons
 ======================  ==============================================================================
@@ -39,7 +39,7 @@ from numpy.typing import NDArray
 
 from agents.map_picture import OBSTACLE, draw_map
 from agents.mission import Mission
-from agents.records import AnyRecord, Connectivity, Decision, LogLine, Track
+from agents.records import AnyRecord, Connectivity, Decision, LogLine, Planned, Track
 from agents.tree_layout import lay_out
 from protocol.messages import Point
 
@@ -191,6 +191,8 @@ class RerunRecorder:
                 self._draw_decision(peer, record)
             case Connectivity():
                 self._draw_connectivity(now_ns, record)
+            case Planned():
+                self._gather(now_ns, "planning_ms", _scalar_columns, [1e3 * record.planning_s])
             case LogLine():
                 self._log(f"log/{peer}", rr.TextLog(f"{peer}: {record.text}", level=_LEVELS[record.level]))
         if isinstance(record, Decision | LogLine) or time.monotonic() - self._flushed_at >= FLUSH_PERIOD_S:
@@ -264,7 +266,6 @@ class RerunRecorder:
             ),
             rr.GraphEdges(edges=list(deployment.edges), graph_type="undirected"),
         )
-        self._log("planning_ms", rr.Scalars(1e3 * decision.planning_s))
         change = "new tree" if decision.topology_changed else "same tree"
         what = f"decision {deployment.decision} ({change}, {1e3 * decision.planning_s:.0f} ms)"
         self._log(f"log/{peer}", rr.TextLog(f"{peer}: {what}: {deployment.reason}", level=rr.TextLogLevel.INFO))
