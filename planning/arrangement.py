@@ -102,11 +102,8 @@ def _place_points(
     """
     walls = np.arange(len(vertices))
     span = vertices[after] - vertices
-    base = np.concatenate([walls, lines.base])
     length = np.hypot(span[:, 0], span[:, 1])
     wall_direction = span / length[:, None]
-    direction = np.concatenate([wall_direction, lines.direction])
-    reach = np.concatenate([np.stack([np.zeros_like(length), length], axis=1), lines.reach])
 
     line, end = np.nonzero(lines.end_wall != NONE)
     host = lines.end_wall[line, end]

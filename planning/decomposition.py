@@ -40,9 +40,10 @@ class Cells:
         areas: (N,) float, square metres.
         centroids: (N, 2) float, metres, map frame, each inside its cell.
         adjacency: (N, N) bool, symmetric, False on the diagonal: cells that share an edge or a piece of one.
-        corners: (C, 2) float, metres, map frame: corners of all cells, each counter-clockwise, one cell after the other.
-        starts: (N + 1,) int: cell k is ``corners[starts[k]:starts[k + 1]]``.
+        starts: (N + 1,) int: cell k has the corners ``starts[k]`` to ``starts[k + 1]``, counter-clockwise.
+        corners: (C, 2) float, metres, map frame: the corners of all cells, one cell after the other.
         frame: the unit frame that the geometry was computed in.
+        unit_corners: (C, 2) float: ``corners`` in that frame, where slivers are not rounded away far from the origin.
     """
 
     environment: Environment
@@ -51,9 +52,10 @@ class Cells:
     areas: Floats
     centroids: Floats
     adjacency: csr_array
-    corners: Floats
     starts: Ints
+    corners: Floats
     frame: Frame
+    unit_corners: Floats
 
     def __len__(self) -> int:
         return len(self.areas)
@@ -77,7 +79,7 @@ class Cells:
 
     @cached_property
     def _index(self) -> CellIndex:
-        return CellIndex.build(self.frame.enter(self.corners), self.starts, self.frame.tolerance)
+        return CellIndex.build(self.unit_corners, self.starts, self.frame.tolerance)
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,7 +147,8 @@ def decompose(environment: Environment, kind: Kind = "inflection", max_bitangent
 
     lines = find_critical_lines(vertices, after, before, reflex, frame.tolerance, longest)
     arrangement = arrange(vertices, after, lines, frame.tolerance)
-    areas, centroids = measure_cells(arrangement.points[arrangement.corners], arrangement.starts)
+    unit_corners = arrangement.points[arrangement.corners]
+    areas, centroids = measure_cells(unit_corners, arrangement.starts)
     areas *= frame.size_m**2
     _check_tiling(environment, frame, arrangement, areas)
     points = frame.leave(arrangement.points)
@@ -157,9 +160,10 @@ def decompose(environment: Environment, kind: Kind = "inflection", max_bitangent
         areas,
         frame.leave(centroids),
         _find_adjacency(arrangement),
-        points[arrangement.corners],
         arrangement.starts,
+        points[arrangement.corners],
         frame,
+        unit_corners,
     )
 
 
