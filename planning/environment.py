@@ -110,12 +110,23 @@ class Environment:
     @cached_property
     def walls(self) -> Floats:
         """(V, 2, 2) float: wall i runs from vertex i to the next of its ring, free space on its left."""
-        return _freeze(np.concatenate([np.stack([ring, np.roll(ring, -1, axis=0)], axis=1) for ring in self.rings]))
+        return _freeze(np.stack([self.vertices, self.vertices[self.successors]], axis=1))
+
+    @cached_property
+    def successors(self) -> Ints:
+        """(V,) int: the vertex after each vertex in its ring."""
+        successors = np.arange(1, len(self.vertices) + 1, dtype=np.int64)
+        successors[self.ring_starts[1:] - 1] = self.ring_starts[:-1]
+        successors.flags.writeable = False
+        return successors
 
     @cached_property
     def is_reflex(self) -> Bools:
         """(V,) bool: where the interior angle of free space is strictly greater than π (thesis eq. 48)."""
-        reflex = np.concatenate([_turns_right(ring) for ring in self.rings])
+        along = self.walls[:, 1] - self.walls[:, 0]
+        onward = along[self.successors]
+        reflex = np.empty(len(along), dtype=np.bool_)
+        reflex[self.successors] = along[:, 0] * onward[:, 1] - along[:, 1] * onward[:, 0] < 0.0
         reflex.flags.writeable = False
         return reflex
 
@@ -236,12 +247,6 @@ def _freeze(array: Floats) -> Floats:
     array = np.ascontiguousarray(array, dtype=np.float64)
     array.flags.writeable = False
     return array
-
-
-def _turns_right(ring: Floats) -> Bools:
-    to_here = ring - np.roll(ring, 1, axis=0)
-    from_here = np.roll(ring, -1, axis=0) - ring
-    return np.asarray(to_here[:, 0] * from_here[:, 1] - to_here[:, 1] * from_here[:, 0] < 0.0)
 
 
 def _read_points(points: ArrayLike) -> Floats:

@@ -79,23 +79,17 @@ def _grow_walls(environment: Environment, radius: float) -> list[shapely.Geometr
     walls = environment.walls
     along = walls[:, 1] - walls[:, 0]
     normals = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.hypot(along[:, 0], along[:, 1])[:, None]
-    arcs: list[Floats] = []
-    before = _predecessors(environment)
-    for i, vertex in enumerate(environment.vertices):
-        arcs.append(_arc(vertex, normals[before[i]], normals[i], radius) if environment.is_reflex[i] else vertex[None])
-    after = np.argsort(before)
+    after = environment.successors
+    before = np.argsort(after)
+    arcs = [
+        _arc(vertex, normals[before[i]], normals[i], radius) if environment.is_reflex[i] else vertex[None]
+        for i, vertex in enumerate(environment.vertices)
+    ]
     pieces: list[shapely.Geometry] = []
     for i, (wall, normal) in enumerate(zip(walls, normals, strict=True)):
         corners = np.concatenate([wall - 0.5 * radius * normal, wall + radius * normal, arcs[i], arcs[after[i]]])
         pieces.append(shapely.MultiPoint(corners).convex_hull)
     return pieces
-
-
-def _predecessors(environment: Environment) -> NDArray[np.int64]:
-    """(V,) int: the vertex before each vertex in its ring."""
-    before = np.arange(-1, len(environment.vertices) - 1)
-    before[environment.ring_starts[:-1]] = environment.ring_starts[1:] - 1
-    return before
 
 
 def _arc(vertex: Floats, start: Floats, end: Floats, radius: float) -> Floats:
