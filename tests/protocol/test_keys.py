@@ -1,0 +1,53 @@
+"""Keys are read as they are written, and what is none of ours is not mistaken for one."""
+
+from __future__ import annotations
+
+import msgspec
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from protocol import keys
+from protocol.keys import Address
+from protocol.messages import BODIES, PERIODIC_KINDS, Name
+
+names = st.from_regex(r"[a-z][a-z0-9_]{0,31}", fullmatch=True).filter(keys.is_name)
+addresses = st.builds(
+    Address, team=names, speaker=names, kind=st.sampled_from([*BODIES, keys.ALIVE]), operator=st.booleans()
+)
+
+
+@given(addresses)
+@settings(deadline=None)
+def test_an_address_is_read_as_it_is_written(address: Address) -> None:
+    assert keys.parse(address.key) == address
+    assert address.key.startswith(keys.everything(address.team).removesuffix("**"))
+
+
+@given(st.text(max_size=40) | st.lists(st.sampled_from(["a", "v1", "operator", "alive", ""]), max_size=7).map("/".join))
+@settings(deadline=None)
+def test_a_key_that_can_be_read_is_the_key_of_its_address(key: str) -> None:
+    address = keys.parse(key)
+    assert address is None or address.key == key
+
+
+@pytest.mark.parametrize(
+    "key", ["", "office", "office/v1/robot1", "office/v2/robot1/state", "office/v1/operator/state", "a/v1/b/c/d/e"]
+)
+def test_foreign_keys_have_no_address(key: str) -> None:
+    assert keys.parse(key) is None
+
+
+@given(st.text(max_size=5) | st.from_regex(r"[a-z][a-z0-9_]{0,33}\n?", fullmatch=True) | st.just("operator"))
+@settings(deadline=None)
+def test_messages_and_keys_agree_on_names(text: str) -> None:
+    try:
+        msgspec.convert(text, Name)
+    except msgspec.ValidationError:
+        assert not keys.is_name(text)
+    else:
+        assert keys.is_name(text)
+
+
+def test_periodic_kinds_are_kinds() -> None:
+    assert set(BODIES) >= PERIODIC_KINDS

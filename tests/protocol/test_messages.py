@@ -1,0 +1,179 @@
+"""Whatever arrives is either a message or a MalformedMessage; whatever is said comes back as it was."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from protocol import messages
+from protocol.messages import (
+    BODIES,
+    Authority,
+    Deployment,
+    Envelope,
+    Goal,
+    GoalReply,
+    Heartbeat,
+    Intent,
+    MalformedMessage,
+    Placement,
+    State,
+    decode,
+    encode,
+)
+
+counts = st.integers(0, 2**53 - 1)
+coordinates = st.floats(-1e7, 1e7)
+points = st.tuples(coordinates, coordinates)
+paths = st.lists(points, max_size=5).map(tuple)
+names = st.from_regex(r"[a-z][a-z0-9_]{0,31}", fullmatch=True).filter(lambda name: name != "operator")
+modes = st.sampled_from(["waiting", "moving", "arrived", "holding"])
+texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=40)
+correlations = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=64)
+seconds = st.floats(0.0, 1e9)
+authorities = st.builds(Authority, epoch=counts, leader=names, sequence=counts)
+bodies = st.one_of(
+    st.builds(Heartbeat, role=st.sampled_from(["base_station", "robot", "tracked_agent"]), mode=modes),
+    st.builds(
+        State,
+        position=points,
+        velocity=points,
+        mode=modes,
+        target=st.none() | points,
+        path=paths,
+        obeying=st.none() | authorities,
+    ),
+    st.builds(Intent, position=points, velocity=points, mode=modes, goal=st.none() | points, path=paths),
+    st.builds(Goal, goal=points, correlation=correlations),
+    st.builds(GoalReply, correlation=correlations, accepted=st.booleans(), reason=texts),
+    st.builds(
+        Deployment,
+        authority=authorities,
+        valid_for_s=seconds,
+        decision=counts,
+        placements=st.lists(
+            st.builds(Placement, robot=names, position=points, cell=st.none() | counts, spare=st.booleans()), max_size=4
+        ).map(tuple),
+        edges=st.lists(st.tuples(names, names), max_size=4).map(tuple),
+        cost=st.floats(allow_nan=False, allow_infinity=False),
+        relays_needed=counts,
+        reason=texts,
+    ),
+)
+envelopes = st.builds(Envelope, sender=names, incarnation=counts, sequence=counts, sent_at_s=seconds, body=bodies)
+
+STATE = encode(
+    Envelope(
+        sender="robot1",
+        incarnation=0,
+        sequence=1,
+        sent_at_s=0.0,
+        body=State(position=(1.0, 2.0), velocity=(0.0, 0.0), mode="moving"),
+    )
+)
+
+
+@given(envelopes)
+@settings(deadline=None)
+def test_what_is_said_comes_back(envelope: Envelope) -> None:
+    payload = encode(envelope)
+    assert decode(payload) == envelope
+    plain = json.loads(payload)  # another reader's view
+    assert plain["schema"] == messages.SCHEMA_VERSION
+    assert plain["body"]["kind"] == envelope.kind
+    assert BODIES[envelope.kind] is type(envelope.body)
+
+
+@given(st.binary(max_size=200))
+@settings(deadline=None)
+def test_noise_is_malformed(payload: bytes) -> None:
+    with pytest.raises(MalformedMessage):
+        decode(payload)
+
+
+@given(envelopes, st.data())
+@settings(deadline=None)
+def test_a_damaged_message_is_malformed_or_a_message(envelope: Envelope, data: st.DataObject) -> None:
+    payload = bytearray(encode(envelope))
+    for _ in range(data.draw(st.integers(1, 4))):
+        place = data.draw(st.integers(0, len(payload) - 1))
+        payload[place : place + data.draw(st.integers(0, 3))] = data.draw(st.binary(max_size=3))
+    try:
+        damaged = decode(bytes(payload))
+    except MalformedMessage:
+        return
+    assert decode(encode(damaged)) == damaged
+
+
+junk = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
+    max_leaves=5,
+)
+
+
+@given(envelopes, junk, st.data())
+@settings(deadline=None)
+def test_a_field_of_another_type_is_malformed_or_harmless(envelope: Envelope, value: Any, data: st.DataObject) -> None:
+    content = json.loads(encode(envelope))
+    where = data.draw(st.sampled_from([content, content["body"]]))
+    where[data.draw(st.sampled_from(sorted(where)))] = value
+    try:
+        changed = decode(json.dumps(content).encode("utf-8", "surrogatepass"))
+    except MalformedMessage:
+        return
+    assert decode(encode(changed)) == changed
+
+
+@pytest.mark.parametrize(
+    "number", ["1e999", "-1e999", "NaN", "Infinity", "-Infinity", "1e308", "1.1e7", "9" * 400, "null", '"1"', "true"]
+)
+def test_positions_are_finite_and_bounded(number: str) -> None:
+    payload = STATE.replace(b"[1.0,2.0]", f"[1.0,{number}]".encode())
+    assert payload != STATE
+    with pytest.raises(MalformedMessage):
+        decode(payload)
+
+
+@pytest.mark.parametrize("nonsense", [math.nan, math.inf, -math.inf])
+def test_a_number_that_is_none_does_not_cross_the_wire(nonsense: float) -> None:
+    body = State(position=(nonsense, 0.0), velocity=(0.0, 0.0), mode="moving")
+    with pytest.raises(MalformedMessage):
+        decode(encode(Envelope(sender="robot1", incarnation=0, sequence=1, sent_at_s=0.0, body=body)))
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        (b'"schema":1', b'"schema":2'),
+        (b'"sender":"robot1"', b'"sender":"Robot 1"'),
+        (b'"sender":"robot1"', b'"sender":"robot1\\n"'),
+        (b'"sender":"robot1"', b'"sender":"operator"'),
+        (b'"sequence":1', b'"sequence":-1'),
+        (b'"sequence":1', b'"sequence":9007199254740992'),
+        (b'"kind":"state"', b'"kind":"estate"'),
+        (b'"mode":"moving"', b'"mode":"dancing"'),
+        (b"[1.0,2.0]", b"[1.0,2.0,3.0]"),
+        (b"[1.0,2.0]", b"[1.0]"),
+        (b'"path":[]', b'"path":' + b"[" * 100_000),
+    ],
+)
+def test_what_does_not_fit_the_schema_is_malformed(old: bytes, new: bytes) -> None:
+    assert old in STATE
+    with pytest.raises(MalformedMessage):
+        decode(STATE.replace(old, new))
+
+
+def test_unknown_fields_are_ignored() -> None:
+    assert decode(STATE.replace(b'"path":[]', b'"path":[],"mood":{"deep":[1,2]}')) == decode(STATE)
+
+
+def test_long_payloads_are_refused_unread() -> None:
+    spaces = b" " * messages.MAXIMUM_PAYLOAD_BYTES
+    with pytest.raises(MalformedMessage, match="more than"):
+        decode(STATE + spaces)
