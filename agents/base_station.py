@@ -15,7 +15,6 @@ from typing import Final, Literal, Protocol
 import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
-from planning.connectivity import components, lambda2
 
 from agents.leader import Plan
 from agents.mission import Mission
@@ -32,6 +31,7 @@ from agents.role import (
     WakeAt,
     Woken,
 )
+from planning.connectivity import algebraic_connectivity, component_labels
 from planning.environment import Environment
 from protocol.bus import PeerAppeared, PeerVanished
 from protocol.messages import AnyBody, Authority, Deployment, Heartbeat, Intent, Mode, Placement, Point, State
@@ -240,7 +240,7 @@ class BaseStation:
                 places[name] = self._known[name].body.position
         points = np.array(list(places.values()))
         visible = self._environment.visibility_matrix(points)
-        component = components(visible)
+        component = component_labels(visible)
         agent_heard = self._agent in self._known
         everybody = len(places) == 2 + len(self._robots)
         return Connectivity(
@@ -250,7 +250,7 @@ class BaseStation:
             agent_visible=bool(agent_heard and np.delete(visible[1], 1).any()),
             chain_connected=bool(agent_heard and component[0] == component[1]),
             team_connected=bool(everybody and component.max() == 0),
-            lambda2=lambda2(visible) if everybody else 0.0,
+            lambda2=algebraic_connectivity(visible) if everybody else 0.0,
             tree_links=tuple(
                 (places[a], places[b])
                 for a, b in (self._said.edges if self._said is not None else ())

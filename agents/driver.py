@@ -23,7 +23,7 @@ class RobotDriver(Protocol):
         """Where the body is: metres, map frame."""
 
     def drive(self, velocity: Point, for_s: float) -> None:
-        """Move at ``velocity`` (m/s, map frame) for at most ``for_s``, then stand: a mind that hangs drives nobody on."""
+        """Move at ``velocity`` (m/s, map frame) for at most ``for_s``, then stand: a mind that hangs drives no body."""
 
 
 class DiscDriver:

@@ -217,9 +217,9 @@ def _sights(places: Floats, there: Bools, environment: Environment) -> Bools:
     sights[:, range(n), range(n)] = True
     for i, j in combinations(range(n), 2):
         both = there[:, i] & there[:, j]
-        sights[both, i, j] = sights[both, j, i] = np.asarray(
-            environment.line_of_sight(places[both, i], places[both, j])
-        )
+        seen = np.asarray(environment.line_of_sight(places[both, i], places[both, j]))
+        sights[both, i, j] = seen
+        sights[both, j, i] = seen
     return sights
 
 
