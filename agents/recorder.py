@@ -107,7 +107,7 @@ class RerunRecorder:
 
     def __init__(self, file: Path, *, team: str, recording_id: str, peer: str) -> None:
         file.parent.mkdir(parents=True, exist_ok=True)
-        file.touch()
+        file.write_bytes(b"")  # says plainly what is wrong with the place, which rerun does not
         self._peer = peer
         self._stream = rr.RecordingStream(
             APPLICATION,

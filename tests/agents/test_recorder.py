@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import io
+import itertools
 import math
 from collections.abc import Iterator
 from pathlib import Path
@@ -89,7 +90,7 @@ def test_bodies_are_drawn_where_they_were(file: Path) -> None:
 
 def test_a_trail_is_the_way_driven_in_pieces_that_meet(file: Path) -> None:
     pieces = [strip for _, strips in rows(file, "/world/peers/agent/trail", "LineStrips2D:strips") for strip in strips]
-    for piece, following in zip(pieces, pieces[1:], strict=False):
+    for piece, following in itertools.pairwise(pieces):
         assert piece[-1] == following[0]
     length_m = sum(math.dist(a, b) for a, b in pieces)
     chord_m = 2 * synthetic.RADIUS_M * math.sin(synthetic.SPEED_RAD_S * synthetic.PERIOD_S / 2)
@@ -173,7 +174,7 @@ def test_closing_twice_and_recording_after_the_end_do_no_harm(tmp_path: Path) ->
 
 def test_a_file_that_cannot_be_written_is_an_error_at_once(tmp_path: Path) -> None:
     (tmp_path / "taken.rrd").mkdir()
-    with pytest.raises(OSError, match="taken.rrd"):
+    with pytest.raises(OSError, match=r"taken\.rrd"):
         RerunRecorder(tmp_path / "taken.rrd", team="demo", recording_id="run", peer="base")
 
 
