@@ -1,0 +1,153 @@
+"""Pictures of maps, their cells, and deployments on them, drawn to scale.
+
+matplotlib is imported when a picture is drawn, not before, and draws without a display.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.environment import Environment
+from protocol.messages import Point
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Floats = NDArray[np.float64]
+
+_FORMATS = (".pdf", ".png", ".svg")
+_LONG_SIDE_IN = 9.0
+_SHORT_SIDE_IN = 3.0
+_DOTS_PER_IN = 160
+
+_SOLID = "#b9c0c9"
+_WALL = "#1d2329"
+_FLOOR = "#ffffff"
+_CELL = "#8fa9c4"
+_SIGHT = "#e07b00"
+_BASE = "#1f4e8c"
+_RELAY = "#16856b"
+_AGENT = "#b3262e"
+
+
+class BadPicture(ValueError):
+    """A picture that cannot be written; the text says file, reason and remedy in one sentence."""
+
+
+def draw_map(environment: Environment, polygons: Sequence[Floats] | None, file: Path, title: str) -> None:
+    """Draw an environment and, faintly, its cells.
+
+    Args:
+        environment: metres.
+        polygons: cells, each (m, 2) float, metres; None draws none.
+        file: written as PNG, PDF or SVG, by its suffix.
+        title: one line above the picture.
+
+    Raises:
+        BadPicture: the file has another suffix or cannot be written.
+    """
+    figure, _ = _draw_floor(environment, polygons, file, title)
+    _write(figure, file)
+
+
+def draw_plan(
+    environment: Environment,
+    polygons: Sequence[Floats] | None,
+    base: Point,
+    agents: Sequence[Point],
+    relays: Sequence[Point],
+    links: Sequence[tuple[Point, Point]],
+    file: Path,
+    title: str,
+) -> None:
+    """Draw a deployment: who stands where, and the lines of sight that join them.
+
+    Args:
+        environment: metres.
+        polygons: cells, each (m, 2) float, metres; None draws none.
+        base: where the base station stands.
+        agents: where each tracked agent is.
+        relays: where each relay is to stand, numbered from 1 in this order.
+        links: the two ends of each line of sight of the chain or tree.
+        file: written as PNG, PDF or SVG, by its suffix.
+        title: one line above the picture.
+
+    Raises:
+        BadPicture: the file has another suffix or cannot be written.
+    """
+    from matplotlib.collections import LineCollection
+
+    figure, axes = _draw_floor(environment, polygons, file, title)
+    for colour, width in ((_FLOOR, 4.5), (_SIGHT, 2.0)):
+        axes.add_collection(LineCollection(list(links), colors=colour, linewidths=width, capstyle="round", zorder=4))
+    axes.plot([], [], color=_SIGHT, linewidth=2, label="line of sight")
+    _draw_peers(axes, [base], "s", _BASE, "base", ["B"])
+    _draw_peers(axes, relays, "o", _RELAY, "relay", [str(number) for number in range(1, len(relays) + 1)])
+    _draw_peers(axes, agents, "D", _AGENT, "agent", ["A"] * len(agents))
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.09), ncols=4, frameon=False, fontsize=8)
+    _write(figure, file)
+
+
+def _draw_floor(
+    environment: Environment, polygons: Sequence[Floats] | None, file: Path, title: str
+) -> tuple[Figure, Axes]:
+    """A new figure with the map to scale; whatever is not free is solid."""
+    if file.suffix.lower() not in _FORMATS:
+        raise BadPicture(f"{file}: pictures are written as {', '.join(_FORMATS)}: give a name that ends so")
+    from matplotlib.collections import PolyCollection
+    from matplotlib.figure import Figure
+    from matplotlib.patches import PathPatch, Rectangle
+    from matplotlib.path import Path as Outline
+
+    left, low, right, high = environment.bounds
+    margin = 0.02 * max(right - left, high - low)
+    width, height = right - left + 2 * margin, high - low + 2 * margin
+    scale = max(_LONG_SIDE_IN / max(width, height), _SHORT_SIDE_IN / min(width, height))
+    figure = Figure(figsize=(width * scale, height * scale))
+    axes = figure.add_axes((0, 0, 1, 1))
+    axes.set(xlim=(left - margin, right + margin), ylim=(low - margin, high + margin), aspect="equal")
+    axes.add_patch(Rectangle((left - margin, low - margin), width, height, facecolor=_SOLID, zorder=0))
+    rings = [np.vstack([ring, ring[:1]]) for ring in (environment.outer, *environment.holes)]
+    walls = Outline.make_compound_path(*(Outline(ring, closed=True) for ring in rings))
+    axes.add_patch(PathPatch(walls, facecolor=_FLOOR, edgecolor="none", zorder=1))
+    if polygons is not None:
+        axes.add_collection(
+            PolyCollection(list(polygons), facecolors="none", edgecolors=_CELL, linewidths=0.35, zorder=2)
+        )
+    axes.add_patch(PathPatch(walls, facecolor="none", edgecolor=_WALL, linewidth=1.2, joinstyle="miter", zorder=3))
+    axes.set_title(title, fontsize=11, loc="left", pad=8)
+    axes.set_xlabel("x [m]", fontsize=8)
+    axes.set_ylabel("y [m]", fontsize=8)
+    axes.tick_params(labelsize=8, length=3)
+    for spine in axes.spines.values():
+        spine.set_visible(False)
+    return figure, axes
+
+
+def _draw_peers(
+    axes: Axes, places: Sequence[Point], marker: str, colour: str, kind: str, labels: Sequence[str]
+) -> None:
+    """Markers of one kind of peer, with a label each, and their entry in the legend."""
+    if not places:
+        return
+    x, y = np.asarray(places, dtype=float).T
+    axes.plot(
+        x, y, marker, color=colour, markersize=10, markeredgecolor="white", markeredgewidth=1.2, label=kind, zorder=5
+    )
+    for place, label in zip(places, labels, strict=True):
+        axes.annotate(label, place, color="white", fontsize=7, weight="bold", ha="center", va="center", zorder=6)
+
+
+def _write(figure: Figure, file: Path) -> None:
+    try:
+        figure.savefig(file, dpi=_DOTS_PER_IN, bbox_inches="tight", facecolor="white")
+    except OSError as fault:
+        raise BadPicture(
+            f"{file}: cannot be written ({fault.strerror}): name a file in a folder you may write to"
+        ) from None
