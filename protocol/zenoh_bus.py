@@ -16,7 +16,6 @@ What the settings are for:
 
 from __future__ import annotations
 
-import atexit
 import json
 import os
 import re
@@ -96,8 +95,8 @@ class ZenohBus:
         except zenoh.ZError as problem:
             raise BusUnavailable(_explanation(listen, others, str(problem))) from problem
         bus = cls(session, team, name, deliver)
-        atexit.register(bus.close)  # a process that leaves a callback declared never ends
         bus._declare(token=not operator)
+        threading.Thread(target=bus._close_with_main_thread, name="zenoh end").start()
         return bus
 
     def publish(self, key: str, payload: bytes) -> None:
@@ -119,7 +118,6 @@ class ZenohBus:
         if not self._open:
             return
         self._open = False
-        atexit.unregister(self.close)
         closing = threading.Thread(target=self._leave, name="zenoh close", daemon=True)
         closing.start()
         closing.join(CLOSE_WITHIN_S)
@@ -134,6 +132,13 @@ class ZenohBus:
         if token:
             own = keys.Address(self.team, self.name, keys.ALIVE).key
             self._declared.append(liveliness.declare_token(own))
+
+    def _close_with_main_thread(self) -> None:
+        # zenoh calls back from Python threads that the interpreter waits for before it does anything else, functions of
+        # atexit included: a process that ends without close() would wait for ever. This thread is waited for as well,
+        # since one that is cut off within zenoh takes the process down.
+        threading.main_thread().join()
+        self.close()
 
     def _leave(self) -> None:
         for declared in reversed(self._declared):  # the token first
