@@ -10,13 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final, Literal, Protocol
+from typing import TYPE_CHECKING, Final, Literal, Protocol
 
 import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
-from agents.leader import Plan
 from agents.mission import Mission
 from agents.records import Connectivity, Decision, LogLine, Planned, Track
 from agents.rhythm import EARLY_S, Rhythm
@@ -35,6 +34,9 @@ from planning.connectivity import algebraic_connectivity, component_labels
 from planning.environment import Environment
 from protocol.bus import PeerAppeared, PeerVanished
 from protocol.messages import AnyBody, Authority, Deployment, Heartbeat, Intent, Mode, Placement, Point, State
+
+if TYPE_CHECKING:
+    from agents.leader import Plan
 
 GRACE_S: Final = 1.5
 """The first deployment waits so long for robots that have not been heard yet."""

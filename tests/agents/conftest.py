@@ -34,6 +34,10 @@ def corner() -> Environment:
 
 @pytest.fixture
 def mission() -> Mission:
+    return make_mission()
+
+
+def make_mission() -> Mission:
     def enlist(name: str, role: str, start: Point) -> RosterEntry:
         return RosterEntry(name=name, role=role, start=start)  # type: ignore[arg-type]
 
