@@ -208,7 +208,7 @@ def _headless_viewer(rrd: Path) -> Iterator[ViewerClient]:
 
 
 def _wait_for(happened: Callable[[], bool], timeout_s: float, otherwise: str) -> None:
-    """Look again and again until it has happened. Raises RecordingFault with the sentence ``otherwise`` if it does not."""
+    """Look until it has happened. Raises RecordingFault with the sentence ``otherwise`` if it does not in time."""
     deadline_s = time.monotonic() + timeout_s
     while not happened():
         if time.monotonic() > deadline_s:

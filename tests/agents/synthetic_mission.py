@@ -26,7 +26,7 @@ ROSTER: tuple[tuple[str, RoleName, Point], ...] = (
     ("robot_2", "robot", (2.0, 10.0)),
     ("agent", "tracked_agent", (16.0, 10.0)),
 )
-PILLAR = np.array([[8.0, 8.0], [12.0, 8.0], [12.0, 12.0], [8.0, 12.0]])
+PILLAR = np.array([[6.0, 6.0], [14.0, 6.0], [14.0, 14.0], [6.0, 14.0]])
 
 
 def environment() -> Environment:
