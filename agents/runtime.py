@@ -166,7 +166,7 @@ def live(mission: Mission, folder: Path, name: str, incarnation: int, ending: En
             print(f"{now():8.3f} {inbox.dropped} messages were dropped unread", file=sys.stderr)
 
 
-def _read_mission(file: Path, name: str, position: Sequence[float] | None) -> Mission:
+def _read_mission(file: Path, name: str, position: str | None) -> Mission:
     """The mission of a file; the peer starts at ``position`` if that is given."""
     from msgspec import json, structs
 
@@ -175,7 +175,7 @@ def _read_mission(file: Path, name: str, position: Sequence[float] | None) -> Mi
     mission = json.decode(file.read_bytes(), type=Mission)
     if position is None:
         return mission
-    x, y = position
+    x, y = map(float, position.split(","))
     moved = structs.replace(mission.entry(name), start=(x, y))
     return structs.replace(mission, roster=tuple(moved if entry.name == name else entry for entry in mission.roster))
 
@@ -187,7 +187,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("name", help="of the peer, as on the roster")
     parser.add_argument("--incarnation", type=int, default=0, help="how many processes bore the name before")
     parser.add_argument("--launcher", type=int, help="process whose death ends this one")
-    parser.add_argument("--position", type=float, nargs=2, metavar=("X", "Y"), help="where its body is by now")
+    parser.add_argument("--position", metavar="X,Y", help="where its body is by now; at its start if not given")
     options = parser.parse_args(arguments)
     ending = Ending()
     if options.launcher is not None:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from agents.mission import Mission
+from planning.connectivity import chain_connected
 from planning.environment import Environment
 from protocol.bus import BusEvent, PeerAppeared, PeerVanished, Received
 from protocol.keys import parse
@@ -29,6 +30,8 @@ class PeerStatus:
     mode: str
     """As in the messages; ``starting`` before the first, ``lost`` when a peer that spoke is not up."""
     position: Point | None
+    obeying: bool
+    """It follows a deployment."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +70,7 @@ class _Known:
     token: bool = False
     mode: str = "starting"
     position: Point | None = None
+    obeying: bool = False
     order: tuple[int, int] = (-1, -1)
 
 
@@ -117,13 +121,17 @@ class TeamView:
         match envelope.body:
             case Heartbeat(mode=mode):
                 known.mode = mode
-            case State(position=position, mode=mode):
-                known.position, known.mode = position, mode
+            case State(position=position, mode=mode, obeying=obeying):
+                known.position, known.mode, known.obeying = position, mode, obeying is not None
             case Intent(position=position, mode=mode, goal=goal):
                 known.position, known.mode, self.goal = position, mode, goal
             case Deployment() as deployment:
                 if self.deployment is None or _later(deployment, self.deployment):
                     self.deployment = deployment
+
+    def position(self, name: str) -> Point | None:
+        """Where a peer was last heard of."""
+        return self._known[name].position
 
     def status(self, now_s: float) -> Status:
         """The team now. O(n²) lines of sight for n peers."""
@@ -134,17 +142,17 @@ class TeamView:
         if placed:
             seen = self.environment.visibility_matrix(np.array([position for _, position in placed]))
         base, agent = self.mission.base_station.name, self.mission.tracked_agent.name
-        agent_visible = chain_connected = False
+        agent_visible = connected = False
         if agent in names:
             j = names.index(agent)
             agent_visible = bool(seen[j].sum() > 1)
-            chain_connected = base in names and bool(_reached(seen, names.index(base))[j])
+            connected = base in names and chain_connected(seen, names.index(base), j)
         return Status(
             peers=peers,
             goal=self.goal,
             deployment=self.deployment,
             agent_visible=agent_visible,
-            chain_connected=chain_connected,
+            chain_connected=connected,
             links=int((seen.sum() - len(placed)) // 2),
         )
 
@@ -152,19 +160,8 @@ class TeamView:
         known = self._known[name]
         up = known.spoke and known.token and now_s - known.heard_at_s < SILENT_AFTER_S
         mode = known.mode if up or not known.spoke else "lost"
-        return PeerStatus(name, up, mode, known.position)
+        return PeerStatus(name, up, mode, known.position, known.obeying)
 
 
 def _later(new: Deployment, old: Deployment) -> bool:
     return (new.authority.epoch, new.authority.sequence) > (old.authority.epoch, old.authority.sequence)
-
-
-def _reached(seen: np.ndarray, start: int) -> np.ndarray:
-    """Which peers are joined to ``start``: (n,) bool for seen (n, n) bool."""
-    reached = np.zeros(len(seen), dtype=bool)
-    reached[start] = True
-    while True:
-        wider = seen[reached].any(axis=0)
-        if (wider == reached).all():
-            return reached
-        reached = wider

@@ -96,21 +96,21 @@ class Supervisor:
                 with contextlib.suppress(ProcessLookupError):
                     peer.process.send_signal(number)
 
+    def command(self, peer: Peer) -> list[str]:
+        """What to execute for a peer's present incarnation."""
+        position = self._find(peer.name) if peer.incarnation else None
+        return [
+            sys.executable,
+            "-P",  # whatever the user's own folder holds, `agents` means ours
+            *("-m", "agents.runtime", str(self._folder / "mission.json"), peer.name),
+            *("--incarnation", str(peer.incarnation), "--launcher", str(os.getpid())),
+            *([] if position is None else [f"--position={position[0]},{position[1]}"]),
+        ]
+
     async def _spawn(self, peer: Peer) -> None:
         """Start a process for a peer's present incarnation."""
-        position = self._find(peer.name) if peer.incarnation else None
         peer.process = await asyncio.create_subprocess_exec(
-            sys.executable,
-            "-P",  # whatever folders the user's own folder holds, `agents` means ours
-            "-m",
-            "agents.runtime",
-            str(self._folder / "mission.json"),
-            peer.name,
-            "--incarnation",
-            str(peer.incarnation),
-            "--launcher",
-            str(os.getpid()),
-            *(() if position is None else ("--position", str(position[0]), str(position[1]))),
+            *self.command(peer),
             stdin=asyncio.subprocess.DEVNULL,
             stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.STDOUT,

@@ -1,0 +1,54 @@
+"""``sightline``: the command line."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from launcher.commands import live, maps, offline
+
+app = typer.Typer(
+    name="sightline",
+    help="A team of robots keeps an unbroken line-of-sight chain between a base station and a walking agent.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+# A place like -3,4 looks like an option to the parser: what it does not know as one, it passes on as an argument.
+_PLACES = {"ignore_unknown_options": True}
+
+app.command()(live.demo)
+app.command()(live.run)
+app.command(context_settings=_PLACES)(live.goal)
+app.command()(offline.simulate)
+app.command()(maps.plan)
+app.command(name="map")(maps.show)
+app.command()(offline.review)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"sightline {version('sightline')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _main(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and end.")
+    ] = False,
+) -> None:
+    """Keep the docstring of the application; the option does its work by itself."""
+
+
+def main() -> None:
+    """Entry of the console script."""
+    app()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,84 @@
+"""``demo``, ``run`` and ``goal``: teams of real processes."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from launcher.console import complain, out, plainly, read_point
+from launcher.scenario import ScenarioFault, find_scenario
+
+if TYPE_CHECKING:
+    from launcher.run import Course
+
+DEMO = "office"
+
+Name = Annotated[str | None, typer.Option(help="Name of the run's folder in runs/; scenario and time if not given.")]
+Duration = Annotated[
+    float | None, typer.Option("--duration", min=1.0, help="Seconds to run, instead of the scenario's duration.")
+]
+
+
+def demo(name: Name = None, duration_s: Duration = None) -> None:
+    """Run the embedded scenario: an agent walks through an office, and robots keep it linked to the base station."""
+    begun_s = time.monotonic()
+    with plainly():
+        _run(find_scenario(DEMO), name, duration_s, begun_s)
+
+
+def run(
+    scenario: Annotated[str, typer.Argument(help="A TOML file, or the name of a scenario that comes with Sightline.")],
+    name: Name = None,
+    duration_s: Duration = None,
+) -> None:
+    """Run a scenario with a process for each peer, watch it live, and leave a recording in runs/."""
+    begun_s = time.monotonic()
+    with plainly():
+        _run(find_scenario(scenario), name, duration_s, begun_s)
+
+
+def goal(
+    place: Annotated[str, typer.Argument(metavar="X,Y", help="Where to go, in metres.")],
+    run: Annotated[str | None, typer.Option(help="Folder or name of the run; the latest if not given.")] = None,
+) -> None:
+    """Send the tracked agent of a running team somewhere."""
+    from launcher.operator import send_goal
+    from launcher.run_folder import RunFolder
+
+    with plainly():
+        x, y = read_point(place, "X,Y")
+        reply = send_goal(RunFolder.find(run).read_mission(), (x, y))
+        if not reply.accepted:
+            raise ScenarioFault(f"the agent refuses {x:g},{y:g}: {reply.reason}")
+        out.print(f"The agent goes to {x:g}, {y:g}.", highlight=False)
+
+
+def _run(file: Path, name: str | None, duration_s: float | None, begun_s: float) -> None:
+    """Run, then merge, measure and say where everything is."""
+    from launcher.run import run as run_team
+
+    course = run_team(file, name, duration_s, out, begun_s)
+    _conclude(course)
+    if course.failure:
+        complain(course.failure)
+        raise typer.Exit(1)
+    if course.interrupted:
+        raise typer.Exit(130)
+
+
+def _conclude(course: Course) -> None:
+    """Merge and measure; say what came of it and where it is."""
+    from launcher.conclusion import conclude
+    from launcher.report import render
+
+    folder = course.folder
+    with out.status("Merging the recordings ...") if out.is_terminal else contextlib.nullcontext():
+        metrics = conclude(folder, course.ended_s)
+    out.print(render(metrics))
+    out.print(f"Recording  {folder.recording}", highlight=False)
+    out.print(f"Metrics    {folder.metrics_file}", highlight=False)
+    out.print(f"Open it    sightline review {folder.path}", highlight=False)

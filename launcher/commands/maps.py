@@ -1,0 +1,128 @@
+"""``map`` and ``plan``: what can be known without a team."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from launcher.console import out, plainly, print_json, read_point
+from launcher.scenario import ScenarioFault, find_map
+
+if TYPE_CHECKING:
+    from planning.environment import Environment
+    from protocol.messages import Point
+
+Decomposition = Annotated[
+    Literal["inflection", "aspect"], typer.Option(help="Cells by inflection lines, or also by bitangents.")
+]
+MapName = Annotated[str, typer.Argument(metavar="MAP", help="A map that comes with Sightline, or a map file.")]
+Picture = Annotated[Path | None, typer.Option(help="Write a picture (.png, .svg or .pdf).")]
+AsJson = Annotated[bool, typer.Option("--json", help="Write JSON for programs.")]
+
+
+def show(
+    name: Annotated[
+        str | None, typer.Argument(metavar="MAP", help="A map that comes with Sightline, or a map file; none: a list.")
+    ] = None,
+    decomposition: Decomposition = "inflection",
+    picture: Picture = None,
+    as_json: AsJson = False,
+) -> None:
+    """Say what a map is like: size, cells and their counts; draw it. Without MAP: list the maps there are."""
+    with plainly():
+        if name is None:
+            _list_maps(as_json)
+        else:
+            _describe_map(name, decomposition, picture, as_json)
+
+
+def _list_maps(as_json: bool) -> None:
+    from rich.table import Table
+
+    import maps
+    from planning.environment import Environment
+
+    environments = {name: Environment.load(maps.path(name)) for name in maps.names()}
+    facts = [_facts(name, environment) for name, environment in environments.items()]
+    if as_json:
+        print_json(facts)
+        return
+    table = Table("map", "size", "free area", "vertices", "holes", box=None)
+    for fact in facts:
+        x0, y0, x1, y1 = fact["bounds"]
+        size = f"{x1 - x0:.1f} × {y1 - y0:.1f} m"
+        table.add_row(fact["name"], size, f"{fact['area_m2']:.0f} m²", str(fact["vertices"]), str(fact["holes"]))
+    out.print(table)
+
+
+def _facts(name: str, environment: Environment) -> dict[str, Any]:
+    return {
+        "name": name,
+        "bounds": [round(value, 6) for value in environment.bounds],
+        "area_m2": round(environment.area, 6),
+        "vertices": len(environment.vertices),
+        "reflex_vertices": len(environment.reflex_vertices),
+        "holes": len(environment.holes),
+    }
+
+
+def _describe_map(name: str, kind: Literal["inflection", "aspect"], picture: Path | None, as_json: bool) -> None:
+    from planning.warm_up import warm_up
+
+    file = find_map(name, Path())
+    _check_picture(picture)
+    from planning.environment import Environment
+
+    environment = Environment.load(file)
+    warm_up(_say(as_json))
+    from planning.decomposition import decompose
+
+    cells = decompose(environment, kind)
+    facts = {
+        **_facts(environment.name or file.stem, environment),
+        "file": str(file),
+        "source": environment.source,
+        "decomposition": kind,
+        "cells": len(cells.areas),
+        "counts": {key: int(value) for key, value in cells.counts.items()},
+    }
+    if picture is not None:
+        from launcher.picture import draw_map
+
+        title = f"{facts['name']}: {facts['cells']} cells ({kind})"
+        draw_map(environment, cells.polygons, picture, title)
+    if as_json:
+        print_json(facts)
+        return
+    x0, y0, x1, y1 = environment.bounds
+    out.print(f"{facts['name']}  ({file})", highlight=False)
+    out.print(f"  size       {x1 - x0:.1f} × {y1 - y0:.1f} m, x {x0:g} to {x1:g}, y {y0:g} to {y1:g}", highlight=False)
+    out.print(f"  free       {environment.area:.1f} m²", highlight=False)
+    out.print(
+        f"  walls      {facts['vertices']} vertices, {facts['reflex_vertices']} of them reflex, {facts['holes']} holes",
+        highlight=False,
+    )
+    out.print(f"  cells      {facts['cells']} ({kind})", highlight=False)
+    out.print("  counts     " + ", ".join(f"{key} {value}" for key, value in facts["counts"].items()), highlight=False)
+    if environment.source:
+        out.print(f"  source     {environment.source}", highlight=False, markup=False)
+    if picture is not None:
+        out.print(f"  picture    {picture}", highlight=False)
+
+
+def _check_picture(picture: Path | None) -> None:
+    if picture is None:
+        return
+    if picture.suffix.lower() not in {".png", ".svg", ".pdf"}:
+        raise ScenarioFault(f"--picture {picture}: cannot draw '{picture.suffix}'; use .png, .svg or .pdf")
+    if not picture.parent.is_dir():
+        raise ScenarioFault(f"--picture {picture}: there is no folder {picture.parent}; make it, or choose another")
+
+
+def _say(as_json: bool) -> Any:
+    """Where to say what is being done: not into JSON."""
+    from launcher.console import err
+
+    return err.print if as_json else out.print

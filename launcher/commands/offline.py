@@ -1,0 +1,165 @@
+"""``simulate`` and ``review``: missions in virtual time, and missions that are over."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from launcher.console import err, out, plainly, print_json
+from launcher.scenario import ScenarioFault, find_scenario
+
+if TYPE_CHECKING:
+    from agents.recorder import RerunRecorder
+    from launcher.preparation import Preparation
+    from launcher.report import Metrics
+
+AsJson = Annotated[bool, typer.Option("--json", help="Write JSON for programs.")]
+
+
+def simulate(
+    scenario: Annotated[str, typer.Argument(help="A TOML file, or the name of a scenario that comes with Sightline.")],
+    seeds: Annotated[
+        int, typer.Option(min=1, max=10000, help="Missions with this many seeds, from the scenario's on.")
+    ] = 1,
+    duration_s: Annotated[
+        float | None, typer.Option("--duration", min=1.0, help="Seconds, instead of the scenario's duration.")
+    ] = None,
+    record: Annotated[Path | None, typer.Option(help="Write the recording of the first mission (.rrd).")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Run the very same roles in virtual time; print what it was worth."""
+    with plainly():
+        file = find_scenario(scenario)
+        if record is not None:
+            _check_recording(record)
+        _simulate(file, seeds, duration_s, record, as_json)
+
+
+def review(
+    run: Annotated[str | None, typer.Argument(help="Folder or name of a run; the latest if not given.")] = None,
+    as_json: AsJson = False,
+    show: Annotated[bool, typer.Option("--open/--no-open", help="Open the recording in the viewer.")] = True,
+) -> None:
+    """Print what a run was worth and why its chain changed; open its recording."""
+    from msgspec import to_builtins
+
+    from launcher.conclusion import conclude, measure_run
+    from launcher.report import render
+    from launcher.review import open_viewer
+    from launcher.run_folder import RunFolder
+
+    with plainly():
+        folder = RunFolder.find(run)
+        # A launcher that was killed has not merged; merging again would miss nothing but takes a while.
+        metrics = measure_run(folder) if folder.recording.is_file() else conclude(folder)
+        if as_json:
+            print_json({"run": str(folder.path), "recording": str(folder.recording), **to_builtins(metrics)})
+            return
+        out.print(f"Run {folder.path}", highlight=False)
+        out.print(render(metrics))
+        if show:
+            out.print(open_viewer(folder.recording), highlight=False)
+
+
+def _check_recording(record: Path) -> None:
+    if record.suffix != ".rrd":
+        raise ScenarioFault(f"--record {record}: a recording is a .rrd file; name it so")
+    if not record.parent.is_dir():
+        raise ScenarioFault(f"--record {record}: there is no folder {record.parent}; make it, or choose another")
+
+
+def _simulate(file: Path, seeds: int, duration_s: float | None, record: Path | None, as_json: bool) -> None:
+    from msgspec import to_builtins
+    from rich.progress import Progress
+
+    from launcher.preparation import prepare
+    from launcher.report import measure, render
+    from launcher.simulation import UNTIL_TOLD_S
+    from launcher.simulation import simulate as simulate_mission
+
+    preparation = prepare(file, err.print)
+    for warning in preparation.warnings:
+        err.print(f"Warning: {warning}", style="yellow", highlight=False)
+    mission, environment = preparation.mission, preparation.environment
+    length_s = duration_s or mission.duration_s or UNTIL_TOLD_S
+    results: list[tuple[int, Metrics]] = []
+    begun_s = time.perf_counter()
+    with Progress(console=err, transient=True) as progress:
+        for seed in progress.track(range(mission.seed, mission.seed + seeds), description="Simulating ..."):
+            recorder = _open_recorder(preparation, record) if record is not None and not results else None
+            try:
+                trace = simulate_mission(mission, environment, recorder=recorder, duration_s=length_s, seed=seed)
+            finally:
+                if recorder is not None:
+                    recorder.close()
+            results.append((seed, measure(trace, environment)))
+    took_s = time.perf_counter() - begun_s
+    if as_json:
+        missions = [{"seed": seed, **to_builtins(metrics)} for seed, metrics in results]
+        print_json({"scenario": str(file), "took_s": round(took_s, 3), "missions": missions})
+        return
+    if seeds == 1:
+        out.print(render(results[0][1]))
+    else:
+        out.print(_compare(results))
+    speed = seeds * length_s / took_s
+    out.print(
+        f"{seeds * length_s:.0f} s of missions in {took_s:.1f} s: {speed:.0f} times faster than real time",
+        highlight=False,
+    )
+    if record is not None:
+        out.print(f"Recording  {record}", highlight=False)
+
+
+def _open_recorder(preparation: Preparation, file: Path) -> RerunRecorder:
+    """A recorder for a whole team, with the map drawn."""
+    from agents.recorder import RerunRecorder
+    from planning.decomposition import decompose
+
+    mission = preparation.mission
+    recorder = RerunRecorder(file, team=mission.team, recording_id=f"{mission.team}-{mission.seed}", peer="simulation")
+    recorder.log_map(preparation.environment, decompose(preparation.environment, mission.decomposition).polygons)
+    recorder.log_blueprint(mission)
+    return recorder
+
+
+def _compare(results: list[tuple[int, Metrics]]) -> Any:
+    """A row per seed, and their mean."""
+    from rich.table import Table
+
+    table = Table(
+        "seed", "agent visible", "chain connected", "team connected", "relays", "driven", "overlaps", box=None
+    )
+    rows = []
+    for seed, metrics in results:
+        shares = metrics.since_first_deployment or metrics.whole_run
+        row = (
+            100 * shares.agent_visible,
+            100 * shares.chain_connected,
+            100 * shares.team_connected,
+            metrics.relays_at_most,
+            metrics.total_distance_m,
+            sum(overlap.episodes for overlap in metrics.overlaps),
+        )
+        rows.append(row)
+        table.add_row(str(seed), *_cells(row))
+    mean = tuple(sum(column) / len(rows) for column in zip(*rows, strict=True))
+    table.add_section()
+    table.add_row("mean", *_cells(mean))
+    table.caption = "shares of time since the first deployment"
+    return table
+
+
+def _cells(row: tuple[float, ...]) -> list[str]:
+    visible, chain, team, relays, driven, overlaps = row
+    return [
+        f"{visible:.1f} %",
+        f"{chain:.1f} %",
+        f"{team:.1f} %",
+        f"{relays:.3g}",
+        f"{driven:.1f} m",
+        f"{overlaps:.3g}",
+    ]

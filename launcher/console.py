@@ -1,0 +1,70 @@
+"""What the commands share: where they write, how a fault ends them, how places are written."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import typer
+from rich.console import Console
+
+from launcher.scenario import ScenarioFault
+from protocol.messages import Point
+
+out = Console()
+err = Console(stderr=True)
+
+BAD_INPUT = 2
+"""Exit status when what was asked for cannot be done as asked."""
+
+_OURS = {"agents", "launcher", "maps", "planning", "protocol"}
+
+
+@contextlib.contextmanager
+def plainly() -> Iterator[None]:
+    """Turn a fault of the user's input, or of the machine's files, into one sentence and an exit status.
+
+    Our own ``ValueError`` subclasses are such faults by convention; any other exception is a defect and shows itself.
+    """
+    try:
+        yield
+    except ValueError as problem:
+        if type(problem).__module__.partition(".")[0] not in _OURS:
+            raise
+        complain(str(problem))
+        raise typer.Exit(BAD_INPUT) from problem
+    except BrokenPipeError as problem:
+        raise typer.Exit(1) from problem
+    except OSError as problem:
+        complain(f"{problem.filename or 'the machine'}: {problem.strerror or problem}; see to that and try again")
+        raise typer.Exit(1) from problem
+    except KeyboardInterrupt as problem:
+        complain("interrupted")
+        raise typer.Exit(130) from problem
+
+
+def complain(text: str) -> None:
+    """Say what is wrong, on stderr, in one line."""
+    err.print(f"sightline: {text}", style="red", markup=False, highlight=False, soft_wrap=True)
+
+
+def print_json(value: Any) -> None:
+    """Write a value for programs, in the order of its keys."""
+    import json
+
+    typer.echo(json.dumps(value, indent=1, allow_nan=False))
+
+
+def read_point(text: str, place: str) -> Point:
+    """The place in ``X,Y``.
+
+    Raises:
+        ScenarioFault: it is no two finite numbers.
+    """
+    with contextlib.suppress(ValueError):
+        x, y = (float(part) for part in text.split(","))
+        if math.isfinite(x) and math.isfinite(y):
+            return x, y
+    raise ScenarioFault(f"{place}: '{text}' is no place; write it in metres as X,Y, for example 3.5,-2")

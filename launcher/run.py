@@ -1,0 +1,183 @@
+"""A live run, from a scenario file to a folder with a recording: check, start, watch, stop, merge, measure."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import signal
+import socket
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from msgspec import structs
+from rich.console import Console
+from rich.live import Live
+
+from agents.mission import Mission
+from launcher import status as display
+from launcher.observer import Status, TeamView
+from launcher.preparation import Preparation, prepare
+from launcher.run_folder import RunFolder
+from launcher.scenario import ScenarioFault
+from launcher.supervisor import Supervisor
+from planning.environment import Environment
+from protocol.inbox import Inbox
+from protocol.zenoh_bus import ZenohBus, free_endpoints
+
+OBSERVER = "launcher"
+"""The launcher listens to its team as an operator of this name."""
+
+LOOK_S = 0.2
+"""How often the launcher looks at what it has heard."""
+LINE_S = 5.0
+"""Where there is no terminal: how often it says how the team is; a chain that breaks or holds again is said at once."""
+
+
+@dataclass
+class Course:
+    """What a run has come to."""
+
+    folder: RunFolder
+    obeyed_after_s: float | None = None
+    """From the command to the first moment at which all robots followed a deployment."""
+    ended_s: float = 0.0
+    """Mission time at which the stopping began."""
+    interrupted: bool = False
+    failure: str = ""
+    """Why the run had to end, if it had to."""
+
+
+def run(file: Path, name: str | None, duration_s: float | None, console: Console, begun_s: float) -> Course:
+    """Run a scenario with real processes until its time is over, or Ctrl-C, or a peer that nobody can replace is lost.
+
+    Args:
+        file: the scenario.
+        name: of the run, or None.
+        duration_s: replaces the scenario's, unless None.
+        console: where to say what happens.
+        begun_s: monotonic time of the command.
+
+    Raises:
+        ScenarioFault: the scenario cannot be run; nothing has been started then.
+    """
+    console.print(f"Checking {file} ...", highlight=False)
+    preparation = prepare(file, console.print)
+    for warning in preparation.warnings:
+        console.print(f"Warning: {warning}", style="yellow", highlight=False)
+    mission = preparation.mission
+    endpoints = reserve_endpoints(file, preparation)
+    roster = tuple(structs.replace(entry, endpoint=to) for entry, to in zip(mission.roster, endpoints, strict=True))
+    mission = structs.replace(
+        mission, roster=roster, duration_s=duration_s or mission.duration_s, epoch_unix_s=time.time()
+    )
+    folder = RunFolder.create(name, mission.team)
+    folder.write(file, mission, preparation.environment)
+    robots = len(mission.robots)
+    console.print(
+        f"Starting {len(roster)} processes (base station, agent, {robots} robots) in {folder.path}; Ctrl-C stops them.",
+        highlight=False,
+    )
+    course = Course(folder)
+    asyncio.run(_accompany(mission, preparation.environment, course, console, begun_s))
+    return course
+
+
+def reserve_endpoints(file: Path, preparation: Preparation) -> list[str]:
+    """An endpoint for each peer. Raises ScenarioFault where a port is taken."""
+    count, base_port = len(preparation.mission.roster), preparation.scenario.network.base_port
+    if base_port is None:
+        return free_endpoints(count)
+    for port in range(base_port, base_port + count):
+        with socket.socket() as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # closed connections do not count
+            try:
+                probe.bind(("127.0.0.1", port))
+                probe.listen()
+            except OSError as problem:
+                raise ScenarioFault(
+                    f"{file}: network.base_port: port {port} on 127.0.0.1 is taken; choose another base_port "
+                    f"({count} ports from it on are used), or leave it out and free ones are found"
+                ) from problem
+    return [f"tcp/127.0.0.1:{port}" for port in range(base_port, base_port + count)]
+
+
+async def _accompany(
+    mission: Mission, environment: Environment, course: Course, console: Console, begun_s: float
+) -> None:
+    """Start the team, watch it until the end, stop it."""
+    stop = asyncio.Event()
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        loop.add_signal_handler(number, stop.set)
+    view = TeamView(mission, environment)
+    supervisor = Supervisor(
+        mission, course.folder.path, lambda text: console.print(text, highlight=False, soft_wrap=True), view.position
+    )
+    inbox: Inbox[None] = Inbox()
+    bus: ZenohBus | None = None
+    try:
+        await supervisor.start()
+        bus = ZenohBus.open(
+            mission.team, OBSERVER, None, [entry.endpoint for entry in mission.roster], inbox.put, operator=True
+        )
+        with _shown(mission, console) as show:
+            while not stop.is_set():
+                now_s = time.time() - mission.epoch_unix_s
+                for event in inbox.wait(0.0):
+                    if event is not None:
+                        view.handle(event, now_s)
+                status = view.status(now_s)
+                show(status, now_s)
+                _note_obedience(status, mission, course, console, begun_s)
+                course.failure = _irreplaceable_loss(supervisor, mission)
+                if course.failure or (mission.duration_s is not None and now_s >= mission.duration_s):
+                    break
+                with contextlib.suppress(TimeoutError):
+                    await asyncio.wait_for(stop.wait(), LOOK_S)
+    finally:
+        course.interrupted = stop.is_set()
+        course.ended_s = time.time() - mission.epoch_unix_s
+        try:
+            console.print("Stopping ...")
+        finally:  # also when nobody reads what we print any more
+            # The bus of the launcher closes beside the stopping, which must not wait for it.
+            closing = loop.run_in_executor(None, bus.close) if bus is not None else None
+            await supervisor.stop()
+            if closing is not None:
+                await closing
+
+
+def _note_obedience(status: Status, mission: Mission, course: Course, console: Console, begun_s: float) -> None:
+    """Say once how long it took until every robot followed a deployment."""
+    robots = {entry.name for entry in mission.robots}
+    if course.obeyed_after_s is None and all(peer.obeying for peer in status.peers if peer.name in robots):
+        course.obeyed_after_s = time.monotonic() - begun_s
+        console.print(f"First deployment obeyed {course.obeyed_after_s:.1f} s after the command.", highlight=False)
+
+
+def _irreplaceable_loss(supervisor: Supervisor, mission: Mission) -> str:
+    """A sentence if the base station or the agent has been given up."""
+    for entry in (mission.base_station, mission.tracked_agent):
+        if supervisor.peers[entry.name].given_up:
+            return f"the run ended because {entry.name} could not be kept alive"
+    return ""
+
+
+@contextlib.contextmanager
+def _shown(mission: Mission, console: Console) -> Iterator[Callable[[Status, float], None]]:
+    """A function that shows a status: redrawn in place on a terminal, lines now and then elsewhere."""
+    if console.is_terminal:
+        with Live(console=console, auto_refresh=False, transient=True) as live:
+            yield lambda status, now_s: live.update(display.draw(status, mission, now_s), refresh=True)
+        return
+    said: tuple[float, bool] = (-LINE_S, False)
+
+    def say(status: Status, now_s: float) -> None:
+        nonlocal said
+        if now_s >= said[0] + LINE_S or status.chain_connected != said[1]:
+            said = (now_s, status.chain_connected)
+            console.print(display.describe(status, now_s), highlight=False, soft_wrap=True)
+
+    yield say

@@ -1,0 +1,67 @@
+"""How the state of a team is shown while it runs: a table that is redrawn on a terminal, single lines elsewhere."""
+
+from __future__ import annotations
+
+from rich.table import Table
+from rich.text import Text
+
+from agents.mission import Mission
+from launcher.observer import Status
+from protocol.messages import Point
+
+_COLOURS = {
+    "moving": "cyan",
+    "arrived": "green",
+    "holding": "yellow",
+    "lost": "red",
+    "starting": "dim",
+    "waiting": "dim",
+}
+
+
+def describe(status: Status, now_s: float) -> str:
+    """The team in one line."""
+    chain = "chain connected" if status.chain_connected else "chain broken"
+    sight = "" if status.chain_connected else ", agent visible" if status.agent_visible else ", agent out of sight"
+    goal = f", agent to {_place(status.goal)}" if status.goal else ""
+    return (
+        f"{now_s:6.1f} s  {status.up}/{len(status.peers)} up, {chain}{sight}, "
+        f"{status.relays} relays, {status.links} lines of sight{goal}"
+    )
+
+
+def draw(status: Status, mission: Mission, now_s: float) -> Table:
+    """The team as a table."""
+    length = f" of {mission.duration_s:g} s" if mission.duration_s is not None else " s, Ctrl-C ends the run"
+    chain = Text("chain connected", "bold green") if status.chain_connected else Text("chain broken", "bold red")
+    sight = Text("agent visible", "green") if status.agent_visible else Text("agent out of sight", "red")
+    table = Table(
+        title=Text(" · ").join([Text(f"{mission.team}  {now_s:.0f}{length}"), chain, sight]),
+        title_justify="left",
+        caption=_deployment(status),
+        caption_justify="left",
+        box=None,
+        pad_edge=False,
+    )
+    for heading in ("peer", "does", "place", "task"):
+        table.add_column(heading, min_width=10)
+    spare = (
+        {placement.robot: placement.spare for placement in status.deployment.placements} if status.deployment else {}
+    )
+    for peer, entry in zip(status.peers, mission.roster, strict=True):
+        task = {"base_station": "base station", "tracked_agent": f"walks to {_place(status.goal)}"}.get(entry.role, "")
+        if entry.role == "robot" and peer.name in spare:
+            task = "spare" if spare[peer.name] else "relay"
+        table.add_row(peer.name, Text(peer.mode, _COLOURS.get(peer.mode, "")), _place(peer.position), task)
+    return table
+
+
+def _deployment(status: Status) -> str:
+    deployment = status.deployment
+    if deployment is None:
+        return "no deployment yet"
+    return f"deployment {deployment.decision}: {status.relays} relays, {deployment.reason}"
+
+
+def _place(point: Point | None) -> str:
+    return f"{point[0]:.1f}, {point[1]:.1f}" if point is not None else "–"

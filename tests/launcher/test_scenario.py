@@ -1,0 +1,214 @@
+"""Faults of a scenario file, each with the sentence that names file, place and remedy; and what a good one becomes."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from agents.mission import Mission, Scripted, Wandering
+from launcher.preparation import Preparation, prepare
+from launcher.scenario import ScenarioFault, find_scenario, packaged, read_scenario
+
+# Two rooms of 8 m by 6 m, joined by a door 1 m wide and 1 m deep at y 2.5 to 3.5.
+TWO_ROOMS = """{"name": "two rooms", "units": "metres", "holes": [], "outer": [
+    [0, 0], [8, 0], [8, 2.5], [9, 2.5], [9, 0], [17, 0], [17, 6], [9, 6], [9, 3.5], [8, 3.5], [8, 6], [0, 6]]}"""
+GOOD = """
+map = "rooms.json"
+duration_s = 20
+[base]
+position = [1.0, 1.0]
+[agent]
+start = [3, 3]
+behaviour = "script"
+goals = [[6, 3], [12, 1]]
+[robots]
+count = 3
+"""
+
+Write = Callable[[str], Path]
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Write:
+    (tmp_path / "rooms.json").write_text(TWO_ROOMS)
+
+    def write_scenario(text: str) -> Path:
+        file = tmp_path / "trial.toml"
+        file.write_text(text)
+        return file
+
+    return write_scenario
+
+
+def silently(_: str) -> None:
+    """Announce nothing."""
+
+
+def prepared(file: Path) -> Preparation:
+    return prepare(file, silently)
+
+
+FAULTS = {
+    "no TOML": (GOOD + "\n[agent", "is not valid TOML", "line"),
+    "no map": (GOOD.replace('map = "rooms.json"\n', ""), "map is missing", 'map = "'),
+    "no base": (GOOD.replace("[base]\nposition = [1.0, 1.0]\n", ""), "base is missing", "[base]"),
+    "no robots": (GOOD.replace("count = 3", ""), "neither count nor starts", "count = 4"),
+    "unknown key": (GOOD.replace("start =", "strat ="), "unknown key 'strat' in [agent]", "did you mean 'start'"),
+    "key in the wrong table": ("heartbeat_hz = 2\n" + GOOD, "unknown key 'heartbeat_hz'", "belongs into [rates]"),
+    "unknown table": (GOOD + "\n[robotz]\n", "unknown key 'robotz'", "did you mean 'robots'"),
+    "key unlike any": (GOOD + "\n[rates]\nzzz = 1\n", "unknown key 'zzz' in [rates]", "control_hz, heartbeat_hz"),
+    "text for a number": (GOOD.replace("[6, 3]", '[6, "3"]'), "agent.goals[0][1] is text", "must be a number"),
+    "number for a place": (GOOD.replace("[6, 3]", "6"), "agent.goals[0] is a whole number", "[x, y] in metres"),
+    "three coordinates": (GOOD.replace("[3, 3]", "[3, 3, 0]"), "agent.start has 3 numbers", "[x, y] in metres"),
+    "fraction of a robot": (GOOD.replace("count = 3", "count = 2.5"), "robots.count is a number", "a whole number"),
+    "no robot": (GOOD.replace("count = 3", "count = 0"), "robots.count is out of range", "at least 1"),
+    "negative speed": (GOOD + "speed_m_s = -1\n", "robots.speed_m_s is out of range", "more than 0"),
+    "not a number": (GOOD.replace("[6, 3]", "[nan, 3]"), "agent.goals[0][0] is nan", "a finite number"),
+    "endless": (GOOD.replace("duration_s = 20", "duration_s = inf"), "duration_s is inf", "a finite number"),
+    "misspelt choice": (GOOD.replace('"script"', '"scrpt"'), "agent.behaviour is 'scrpt'", "did you mean 'script'"),
+    "unlike any choice": (GOOD.replace('"script"', '"zzz"'), "agent.behaviour is 'zzz'", "script, wander, goals"),
+    "script without goals": (GOOD.replace("goals =", "#"), "'script' and there are no goals", "add goals = "),
+    "goals without script": (GOOD.replace('"script"', '"wander"'), "behaviour is 'wander'", 'behaviour = "script"'),
+    "name no name": ('name = "A team"\n' + GOOD, "name 'A team' cannot name a team", "use at most 32"),
+    "orders that run out": (
+        GOOD + "\n[planning]\nperiod_s = 2.0\nvalid_for_s = 1.0\n",
+        "planning.valid_for_s",
+        "make it at least 4",
+    ),
+    "count and starts differ": (GOOD + "starts = [[2, 2]]\n", "robots.count is 3 and robots.starts has 1", "remove"),
+    "absent map": (GOOD.replace("rooms.json", "absent.json"), "no map absent.json", "give a map file or one of"),
+    "misspelt map": (GOOD.replace("rooms.json", "rom1"), "no map rom1", "did you mean 'room1'"),
+    "base in a wall": (GOOD.replace("[1.0, 1.0]", "[8.5, 1]"), "base.position [8.5, 1] is inside a wall", "move it"),
+    "base off the map": (GOOD.replace("[1.0, 1.0]", "[-5, 1]"), "off the map (x 0 to 17, y 0 to 6)", "move it"),
+    "agent in a wall": (GOOD.replace("[3, 3]", "[8.5, 5]"), "agent.start [8.5, 5] is inside a wall", "move it"),
+    "agent at a wall": (GOOD.replace("[3, 3]", "[3, 0.1]"), "agent.start [3, 0.1] is 0.10 m from a wall", "move it"),
+    "goal off the map": (GOOD.replace("[12, 1]", "[12, 9]"), "agent.goals[1] [12, 9] is inside a wall", "move it"),
+    "goal at a wall": (GOOD.replace("[12, 1]", "[12, 0]"), "agent.goals[1] [12, 0] is 0.00 m from a wall", "move it"),
+    "goal behind a narrow door": (
+        GOOD.replace("[agent]", "[agent]\nradius_m = 0.6"),
+        "agent.goals[1] [12, 1] cannot be reached from agent.start [3, 3]",
+        "agent.radius_m smaller",
+    ),
+    "robot in a wall": (
+        GOOD.replace("count = 3", "starts = [[2, 2], [8.5, 1]]"),
+        "robots.starts[1] [8.5, 1] is inside a wall",
+        "move it",
+    ),
+    "robots on each other": (
+        GOOD.replace("count = 3", "starts = [[2, 2], [2.3, 2]]"),
+        "robots.starts[1] [2.3, 2] overlaps robots.starts[0]",
+        "0.4 m apart",
+    ),
+    "robot on the agent": (
+        GOOD.replace("count = 3", "starts = [[3.1, 3]]"),
+        "robots.starts[0] [3.1, 3] overlaps agent.start",
+        "0.4 m apart",
+    ),
+    "no room for so many": (
+        GOOD.replace("count = 3", "count = 100\nradius_m = 0.49"),
+        "robots of radius 0.49 m have room",
+        "robots.starts",
+    ),
+    "robots too wide": (GOOD + "radius_m = 5\n", "robots.radius_m = 5", "smaller"),
+}
+
+
+@pytest.mark.parametrize("case", FAULTS)
+def test_a_fault_is_one_sentence_with_file_place_and_remedy(case: str, write: Write) -> None:
+    text, place, remedy = FAULTS[case]
+    file = write(text)
+    with pytest.raises(ScenarioFault) as caught:
+        prepared(file)
+    said = str(caught.value)
+    assert said.startswith(str(file))
+    assert place in said
+    assert remedy in said
+    assert "\n" not in said
+
+
+def test_an_unreadable_scenario_says_why(tmp_path: Path) -> None:
+    with pytest.raises(ScenarioFault, match="cannot be read"):
+        read_scenario(tmp_path)
+    binary = tmp_path / "binary.toml"
+    binary.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ScenarioFault, match="UTF-8"):
+        read_scenario(binary)
+
+
+def test_an_unknown_scenario_is_answered_with_the_near_one() -> None:
+    with pytest.raises(ScenarioFault, match="did you mean 'office'"):
+        find_scenario("offce")
+    with pytest.raises(ScenarioFault, match=r"give a TOML file or one of .*office"):
+        find_scenario("zzz")
+
+
+def test_a_good_scenario_becomes_a_mission(write: Write) -> None:
+    preparation = prepared(write(GOOD))
+    mission = preparation.mission
+    assert isinstance(mission, Mission)
+    assert mission.team == "trial"
+    assert mission.base_station.start == (1.0, 1.0)
+    assert mission.tracked_agent.start == (3.0, 3.0)
+    assert isinstance(mission.behaviour, Scripted)
+    assert mission.behaviour.goals == ((6.0, 3.0), (12.0, 1.0))
+    assert len({entry.name for entry in mission.roster}) == len(mission.roster) == 5
+
+
+def test_automatic_starts_are_near_the_base_in_its_sight_and_apart(write: Write) -> None:
+    text = GOOD.replace("count = 3", "count = 20").replace("[1.0, 1.0]", "[7.5, 5.5]")
+    preparation = prepared(write(text))
+    mission, environment = preparation.mission, preparation.environment
+    starts = np.array([robot.start for robot in mission.robots])
+    assert len(starts) == 20
+    assert environment.line_of_sight(np.array(mission.base_station.start), starts).all()
+    gaps = np.linalg.norm(starts[:, None] - starts[None], axis=2) + 10 * np.eye(len(starts))
+    assert gaps.min() >= 2 * mission.robot_radius_m
+    to_agent = np.linalg.norm(starts - np.array(mission.tracked_agent.start), axis=1)
+    assert to_agent.min() >= mission.robot_radius_m + mission.agent_radius_m
+    wall_gaps = [environment.polygon.boundary.distance(_point(start)) for start in starts]
+    assert min(wall_gaps) >= mission.robot_radius_m - 1e-6
+
+
+def _point(start: np.ndarray) -> object:
+    import shapely
+
+    return shapely.Point(start)
+
+
+def test_too_few_robots_for_a_goal_say_how_many_it_needs(write: Write) -> None:
+    # From (1, 1), the point (16, 5.5) is seen through the door only over one corner and then the other: two relays.
+    text = GOOD.replace("[12, 1]", "[16, 5.5]").replace("count = 3", "count = 1")
+    with pytest.raises(ScenarioFault, match=r"agent\.goals\[1\].* needs (\d) robots.*robots\.count"):
+        prepared(write(text))
+
+
+def test_fewer_robots_than_another_place_needs_is_a_warning(write: Write) -> None:
+    text = (
+        GOOD.replace("goals = [[6, 3], [12, 1]]", "").replace('"script"', '"wander"').replace("count = 3", "count = 1")
+    )
+    preparation = prepared(write(text))
+    assert isinstance(preparation.mission.behaviour, Wandering)
+    assert len(preparation.warnings) == 1
+    assert "need" in preparation.warnings[0]
+
+
+@pytest.mark.parametrize("name", packaged())
+def test_packaged_scenarios_are_sound(name: str) -> None:
+    preparation = prepared(find_scenario(name))
+    assert preparation.mission.team == name
+
+
+def test_a_taken_port_is_named(write: Write) -> None:
+    from launcher.run import reserve_endpoints
+
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        file = write(GOOD + f"\n[network]\nbase_port = {port - 1}\n")
+        with pytest.raises(ScenarioFault, match=rf"network\.base_port: port {port} .*choose another base_port"):
+            reserve_endpoints(file, prepared(file))
