@@ -1,9 +1,14 @@
 """The mutual visibility graph: which pairs of cells see each other with all their points.
 
 Two convex cells P and Q are mutually visible iff the hull of P ∪ Q lies in free space (thesis §3.2.1). The hull's
-border is a part of P's, a part of Q's, and two *bridges*, its common tangents. So the hull is free iff no wall crosses
-a bridge and no hole lies in the quadrilateral between the bridges (§4.1.1, steps 2–5, with the bridges found directly
-instead of through a hull).
+border is a part of P's, a part of Q's, and two *bridges*, the outer common tangents. So the hull is free iff no wall
+crosses a bridge and no hole lies between the bridges (§4.1.1, steps 2–5). Three observations make that cheap:
+
+- A segment from p to q that enters an obstacle crosses a wall with p strictly in front and q strictly behind. So only
+  walls matter that have a corner of P in front and a corner of Q behind; if there is none, the cells see each other.
+- A hole between the bridges has such a wall, and that wall has an end between the bridges. So the same walls tell of
+  the bridges and of the holes.
+- The wall that hides a cell mostly hides its neighbours too. It is tried first, on the segment of the centroids.
 
 Cells touch walls, and bridges of cells run along walls and through vertices: grazing is seeing. So every cell is first
 shrunk about its centroid by the factor 1 − `SHRINKAGE`; then a bridge meets a wall only if it crosses it. An obstacle
@@ -34,8 +39,7 @@ def mutual_visibility(cells: Cells) -> csr_array:
     Returns:
         (N, N) bool, symmetric, True on the diagonal.
 
-    Complexity: O(N² V) at worst for N cells and V walls; most pairs cost a few wall tests, for the wall that hides a
-    cell from another mostly hides its neighbours too.
+    Complexity: O(N² V) for N cells and V walls, of which a hidden pair mostly costs O(1).
     """
     environment, frame = cells.environment, cells.frame
     n = len(cells)
@@ -43,24 +47,43 @@ def mutual_visibility(cells: Cells) -> csr_array:
     centre = np.repeat(centroids, np.diff(cells.starts), axis=0)
     shrunk = centre + (1.0 - SHRINKAGE) * (cells.unit_corners - centre)
     walls = frame.enter(environment.walls.reshape(-1, 2)).reshape(-1, 4)
-    holes = frame.enter(environment.vertices[environment.ring_starts[1:-1]])
     # Neighbours after each other: depth first along adjacency.
     order = depth_first_order(cells.adjacency, 0, directed=False, return_predecessors=False).astype(np.int64)
-    seen = _find_visible(shrunk, cells.starts, centroids, order, walls, holes)
+    seen = _find_visible(shrunk, cells.starts, centroids, order, walls)
     flat = np.flatnonzero(seen)
     starts = np.concatenate([[0], np.cumsum(np.count_nonzero(seen, axis=1))])
     return csr_array((np.ones(len(flat), np.bool_), flat % n, starts), shape=(n, n))
 
 
 @njit(cache=True, nogil=True)
-def _crosses(wall: Floats, px: float, py: float, qx: float, qy: float) -> bool:
-    """Whether the segment from p to q crosses a wall (4,): one end in front of it, the other not, and vice versa."""
-    ax, ay, bx, by = wall[0], wall[1], wall[2], wall[3]
-    dx, dy = bx - ax, by - ay
-    if (dx * (py - ay) - dy * (px - ax) > 0.0) == (dx * (qy - ay) - dy * (qx - ax) > 0.0):
+def _sort_walls(corners: Floats, starts: Ints, walls: Floats) -> tuple[Bools, Bools]:
+    """Which cells have a corner strictly in front of which walls, and strictly behind: (N, V) bool each. O(C V)."""
+    n = len(starts) - 1
+    front, behind = np.zeros((n, len(walls)), np.bool_), np.zeros((n, len(walls)), np.bool_)
+    for w in range(len(walls)):
+        ax, ay = walls[w, 0], walls[w, 1]
+        dx, dy = walls[w, 2] - ax, walls[w, 3] - ay
+        for i in range(n):
+            for k in range(starts[i], starts[i + 1]):
+                side = dx * (corners[k, 1] - ay) - dy * (corners[k, 0] - ax)
+                front[i, w] = front[i, w] or side > 0.0
+                behind[i, w] = behind[i, w] or side < 0.0
+    return front, behind
+
+
+@njit(cache=True, nogil=True)
+def _side(px: float, py: float, qx: float, qy: float, x: float, y: float) -> float:
+    """Positive when (x, y) is left of the line from p to q, negative when right."""
+    return (qx - px) * (y - py) - (qy - py) * (x - px)
+
+
+@njit(cache=True, nogil=True)
+def _crosses(walls: Floats, w: int, px: float, py: float, qx: float, qy: float) -> bool:
+    """Whether the segment from p to q goes through wall w from its front."""
+    ax, ay, bx, by = walls[w, 0], walls[w, 1], walls[w, 2], walls[w, 3]
+    if _side(ax, ay, bx, by, qx, qy) >= 0.0 or _side(ax, ay, bx, by, px, py) <= 0.0:
         return False
-    ux, uy = qx - px, qy - py
-    return bool((ux * (ay - py) - uy * (ax - px) > 0.0) != (ux * (by - py) - uy * (bx - px) > 0.0))
+    return (_side(px, py, qx, qy, ax, ay) > 0.0) != (_side(px, py, qx, qy, bx, by) > 0.0)
 
 
 @njit(cache=True, nogil=True)
@@ -76,14 +99,12 @@ def _find_bridge(corners: Floats, p: int, p_end: int, q: int, q_end: int, side: 
         moved = False
         x, y = corners[q, 0], corners[q, 1]
         for k in range(p_first, p_end):
-            ux, uy = x - corners[p, 0], y - corners[p, 1]
-            if side * (ux * (corners[k, 1] - corners[p, 1]) - uy * (corners[k, 0] - corners[p, 0])) > 0.0:
+            if side * _side(corners[p, 0], corners[p, 1], x, y, corners[k, 0], corners[k, 1]) > 0.0:
                 p = k
                 moved = True
         x, y = corners[p, 0], corners[p, 1]
         for k in range(q_first, q_end):
-            ux, uy = corners[q, 0] - x, corners[q, 1] - y
-            if side * (ux * (corners[k, 1] - y) - uy * (corners[k, 0] - x)) > 0.0:
+            if side * _side(x, y, corners[q, 0], corners[q, 1], corners[k, 0], corners[k, 1]) > 0.0:
                 q = k
                 moved = True
         if not moved:
@@ -92,76 +113,69 @@ def _find_bridge(corners: Floats, p: int, p_end: int, q: int, q_end: int, side: 
 
 
 @njit(cache=True, nogil=True)
-def _holds(corners: Floats, a: int, b: int, c: int, d: int, x: float, y: float) -> bool:
-    """Whether (x, y) lies in the convex quadrilateral of four corners, counter-clockwise."""
-    inside = True
-    for i, j in ((a, b), (b, c), (c, d), (d, a)):
-        ux, uy = corners[j, 0] - corners[i, 0], corners[j, 1] - corners[i, 1]
-        inside = inside and ux * (y - corners[i, 1]) - uy * (x - corners[i, 0]) >= 0.0
-    return inside
+def _find_obstacle(
+    corners: Floats, p: int, p_end: int, q: int, q_end: int, walls: Floats, candidates: Ints, count: int
+) -> int:
+    """The first of the ``count`` candidate walls that enters the hull of two shrunk cells, or -1."""
+    a, b = _find_bridge(corners, p, p_end, q, q_end, 1.0)
+    c, d = _find_bridge(corners, p, p_end, q, q_end, -1.0)
+    ax, ay, bx, by = corners[a, 0], corners[a, 1], corners[b, 0], corners[b, 1]
+    cx, cy, dx, dy = corners[c, 0], corners[c, 1], corners[d, 0], corners[d, 1]
+    for f in range(count):
+        w = candidates[f]
+        x, y = walls[w, 0], walls[w, 1]
+        start_left = _side(ax, ay, bx, by, x, y) > 0.0
+        start_right = _side(cx, cy, dx, dy, x, y) < 0.0
+        end_left = _side(ax, ay, bx, by, walls[w, 2], walls[w, 3]) > 0.0
+        end_right = _side(cx, cy, dx, dy, walls[w, 2], walls[w, 3]) < 0.0
+        if (start_left and end_left) or (start_right and end_right):
+            continue
+        if start_left != end_left and _crosses(walls, w, ax, ay, bx, by):
+            return w
+        if start_right != end_right and _crosses(walls, w, cx, cy, dx, dy):
+            return w
+        if not (start_left or start_right) and _side(cx, cy, ax, ay, x, y) <= 0.0 and _side(dx, dy, bx, by, x, y) >= 0.0:
+            return w
+    return -1
 
 
 @njit(cache=True, nogil=True)
-def _find_visible(corners: Floats, starts: Ints, centroids: Floats, order: Ints, walls: Floats, holes: Floats) -> Bools:
-    """`mutual_visibility` as a dense (N, N) array.
-
-    A segment from a cell into an obstacle crosses a wall that the cell has a corner in front of, so only those walls
-    are tested. Before them come the walls that hid the previous cell of the row and the same cell in the previous row.
-    """
+def _find_visible(corners: Floats, starts: Ints, centroids: Floats, order: Ints, walls: Floats) -> Bools:
+    """`mutual_visibility` as a dense (N, N) array; ``order`` puts near cells after each other."""
     n = len(order)
     seen = np.zeros((n, n), np.bool_)
-    hid = np.zeros(n, np.int64)  # by cell: the wall that last hid its centroid
-    cut = np.zeros(n, np.int64)  # by cell: the wall that last crossed a bridge to it
-    facing = np.empty(len(walls), np.int64)
+    front, behind = _sort_walls(corners, starts, walls)
+    hides = np.zeros(n, np.int64)  # by cell: the wall that last hid it
+    facing, candidates = np.empty(len(walls), np.int64), np.empty(len(walls), np.int64)
     for row in range(n):
         i = order[row]
         seen[i, i] = True
-        p, p_end = starts[i], starts[i + 1]
         px, py = centroids[i, 0], centroids[i, 1]
-        m = 0
+        faces = 0
         for w in range(len(walls)):
-            ax, ay = walls[w, 0], walls[w, 1]
-            dx, dy = walls[w, 2] - ax, walls[w, 3] - ay
-            for k in range(p, p_end):
-                if dx * (corners[k, 1] - ay) - dy * (corners[k, 0] - ax) > 0.0:
-                    facing[m] = w
-                    m += 1
-                    break
-        last = 0
+            if front[i, w]:
+                facing[faces] = w
+                faces += 1
+        last = 0  # the wall that last hid a cell of this row
         for column in range(row + 1, n):
             j = order[column]
             qx, qy = centroids[j, 0], centroids[j, 1]
-            if _crosses(walls[last], px, py, qx, qy):
-                hid[j] = last
+            if _crosses(walls, last, px, py, qx, qy):
                 continue
-            if _crosses(walls[hid[j]], px, py, qx, qy):
-                last = hid[j]
+            if _crosses(walls, hides[j], px, py, qx, qy):
+                last = hides[j]
                 continue
-            hidden = False
-            for f in range(m):
-                if _crosses(walls[facing[f]], px, py, qx, qy):
-                    last = facing[f]
-                    hid[j] = last
-                    hidden = True
-                    break
-            if hidden:
-                continue
-            q, q_end = starts[j], starts[j + 1]
-            p_left, q_left = _find_bridge(corners, p, p_end, q, q_end, 1.0)
-            p_right, q_right = _find_bridge(corners, p, p_end, q, q_end, -1.0)
-            lx, ly, ltx, lty = corners[p_left, 0], corners[p_left, 1], corners[q_left, 0], corners[q_left, 1]
-            rx, ry, rtx, rty = corners[p_right, 0], corners[p_right, 1], corners[q_right, 0], corners[q_right, 1]
-            wall = walls[cut[j]]
-            if _crosses(wall, lx, ly, ltx, lty) or _crosses(wall, rx, ry, rtx, rty):
-                continue
-            for f in range(m):
-                wall = walls[facing[f]]
-                if _crosses(wall, lx, ly, ltx, lty) or _crosses(wall, rx, ry, rtx, rty):
-                    cut[j] = facing[f]
-                    hidden = True
-                    break
-            for h in range(len(holes)):
-                hidden = hidden or _holds(corners, p_right, q_right, q_left, p_left, holes[h, 0], holes[h, 1])
-            if not hidden:
+            count = 0
+            for f in range(faces):
+                candidates[count] = facing[f]
+                count += behind[j, facing[f]]
+            obstacle = -1
+            if count > 0:
+                obstacle = _find_obstacle(
+                    corners, starts[i], starts[i + 1], starts[j], starts[j + 1], walls, candidates, count
+                )
+            if obstacle < 0:
                 seen[i, j] = seen[j, i] = True
+            else:
+                last = hides[j] = obstacle
     return seen
