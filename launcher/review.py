@@ -34,6 +34,8 @@ RECORDINGS = "recordings"
 _MERGING_S = 600.0
 _VIEWER_START_S = 30.0
 _VIEWER_DRAW_S = 15.0
+_VIEWER_SETTLE_S = 6.0
+"""Views load in the background, and the viewer's notices lie over them for a while; nothing tells when that is over."""
 _PICTURE_SIZE = "1600x900"
 
 _decoder = msgspec.json.Decoder(AnyRecord)
@@ -161,7 +163,7 @@ def draw_picture(rrd: Path, time_s: float, picture: Path) -> None:
     picture.unlink(missing_ok=True)
     with _headless_viewer(rrd) as viewer:
         viewer.set_time(TIMELINE, duration=time_s, play_state="paused")
-        time.sleep(1.0)  # views load what they show in the background, and nothing tells when they are done
+        time.sleep(_VIEWER_SETTLE_S)
         viewer.save_screenshot(str(picture.absolute()))
         _wait_for(picture.is_file, _VIEWER_DRAW_S, f"{picture}: the viewer did not write the picture")
 

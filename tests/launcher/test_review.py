@@ -243,8 +243,11 @@ def test_a_picture_needs_a_renderer(run_folder: Path, tmp_path: Path, monkeypatc
         review.draw_picture(run_folder / "run.rrd", 5.0, tmp_path / "picture.png")
 
 
-def test_the_picture_is_not_mirrored_and_no_view_complains(run_folder: Path, tmp_path: Path) -> None:
+def test_the_picture_is_not_mirrored_and_no_view_complains(
+    run_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The base station stands one metre from the left and from the *lower* wall of a room of 20 m."""
+    monkeypatch.setattr(review, "_VIEWER_SETTLE_S", 1.0)
     picture = tmp_path / "picture.png"
     try:
         review.draw_picture(run_folder / "run.rrd", 0.0, picture)
