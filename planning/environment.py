@@ -175,7 +175,11 @@ class Environment:
         Complexity: O(n w).
         """
         starts, ends = _read_points(p), _read_points(q)
-        n = max(len(starts), len(ends)) if len(starts) and len(ends) else 0
+        if len(starts) != len(ends) and 1 not in (len(starts), len(ends)):
+            raise ValueError(
+                f"line of sight between {len(starts)} points and {len(ends)}: give as many, or a single one"
+            )
+        n = len(ends) if len(starts) == 1 else len(starts)
         visible: Bools = line_of_sight.segments_are_visible(
             _repeat(starts, n), _repeat(ends, n), self.walls, self.tolerance_m
         )

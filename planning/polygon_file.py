@@ -115,7 +115,7 @@ def _read_project_map(path: Path, content: dict[str, Any]) -> PolygonMap:
     if unknown:
         raise UnreadableMap(f'{path}: unknown field "{unknown[0]}": a map has {", ".join(sorted(_FIELDS))}')
     units = content.get("units", "metres")
-    if units not in _METRES:
+    if not isinstance(units, str) or units not in _METRES:
         raise UnreadableMap(f'{path}: its units are {units!r}: convert it to metres and write "units": "metres"')
     holes = content.get("holes", [])
     if not isinstance(holes, list):
