@@ -1,7 +1,7 @@
-"""What is left of a run: one recording out of many, the records in it, the metrics, and a look at it.
+"""What is left of a run: one recording out of many, the records in it, and a look at it.
 
-The ``.rrd`` is the only source: metrics are measured from the journal that :mod:`agents.recorder` writes beside
-everything it draws.
+The ``.rrd`` is the only source: the figures of a run are measured on the journal that :mod:`agents.recorder` writes
+beside everything it draws.
 """
 
 from __future__ import annotations
@@ -21,12 +21,9 @@ import msgspec
 from rerun.chunk import RrdReader
 from rerun.experimental import ViewerClient
 
-from agents.mission import Mission
 from agents.recorder import JOURNAL, TIMELINE
 from agents.records import AnyRecord
-from launcher.report import Metrics, MissionTrace, measure
 from launcher.run_folder import RunFolder
-from planning.environment import Environment
 
 RECORDINGS = "recordings"
 """Folder of a run in which each process leaves its own file."""
@@ -88,7 +85,7 @@ def read_records(rrd: Path) -> list[tuple[float, str, AnyRecord]]:
     """Everything that was recorded: (mission time in seconds, peer, record), by time and then by peer.
 
     Raises:
-        RecordingFault: the file is absent, damaged, or not of this version.
+        RecordingFault: the file is absent, damaged, not of this version, or not of a run.
     """
     if not rrd.is_file():
         raise RecordingFault(f"{rrd}: there is no such recording; name the folder of a run, or merge it again")
@@ -105,34 +102,10 @@ def read_records(rrd: Path) -> list[tuple[float, str, AnyRecord]]:
                     records.extend((time_ns * 1e-9, peer, _decoder.decode(text)) for text in texts)
     except (RuntimeError, ValueError, KeyError) as problem:
         raise RecordingFault(f"{rrd}: not a recording of a run, or damaged ({problem}); merge it again") from problem
+    if not records:
+        raise RecordingFault(f"{rrd}: no record of any peer in it; is it the recording of something else?")
     records.sort(key=lambda entry: entry[:2])
     return records
-
-
-def read_trace(rrd: Path, mission: Mission) -> MissionTrace:
-    """The course of a mission, from its recording; it ends with the last record.
-
-    Raises:
-        RecordingFault: as :func:`read_records`, or nothing of this mission is in it.
-    """
-    records = read_records(rrd)
-    names = {entry.name for entry in mission.roster}
-    if not any(peer in names for _, peer, _ in records):
-        raise RecordingFault(f"{rrd}: no record of team {mission.team} in it; is it another run's?")
-    return MissionTrace.of(records, mission)
-
-
-def review(run_folder: Path) -> Metrics:
-    """Figures of a run, measured on its recording; the recordings of the processes are merged first if need be.
-
-    Raises:
-        RecordingFault: there is no recording that can be read.
-        ValueError: the run's mission or map cannot be read.
-    """
-    folder = RunFolder(run_folder)
-    rrd = folder.recording if folder.recording.is_file() else merge(run_folder)
-    mission = folder.read_mission()
-    return measure(read_trace(rrd, mission), Environment.load(run_folder / mission.map_path))
 
 
 def open_viewer(rrd: Path) -> str:

@@ -18,7 +18,10 @@ from rerun.chunk import RrdReader
 from agents.recorder import RerunRecorder
 from agents.records import AnyRecord, Connectivity, Decision, Track
 from launcher import review
-from launcher.review import RecordingFault, merge, open_viewer, read_records, read_trace
+from launcher.conclusion import conclude, measure_run
+from launcher.report import MissionTrace
+from launcher.review import RecordingFault, merge, open_viewer, read_records
+from launcher.run_folder import RunFolder
 from tests.agents import synthetic_mission as synthetic
 
 RESTART_S, BACK_S = 5.0, 7.0
@@ -64,7 +67,7 @@ def test_the_files_of_all_processes_become_one_recording_with_its_layout(run_fol
     reader = RrdReader(run_folder / "run.rrd")
     assert [entry.recording_id for entry in reader.recordings()] == ["the-run"]
     assert len(reader.blueprints()) == 1
-    assert sorted(file.name for file in run_folder.iterdir()) == ["map.json", "mission.json", "recordings", "run.rrd"]
+    assert [file.name for file in run_folder.glob("*run.rrd")] == ["run.rrd"], "nothing half-made is left"
 
 
 def test_records_are_read_back_as_they_were_written(run_folder: Path) -> None:
@@ -84,7 +87,7 @@ def test_records_are_read_back_as_they_were_written(run_folder: Path) -> None:
 
 
 def test_the_trace_is_the_truth_about_every_peer(run_folder: Path) -> None:
-    trace = read_trace(run_folder / "run.rrd", synthetic.mission())
+    trace = MissionTrace.of(read_records(run_folder / "run.rrd"), synthetic.mission())
     assert [trail.peer for trail in trace.trails] == [name for name, _, _ in synthetic.ROSTER]
     for trail in trace.trails:
         truth = np.array([synthetic.position(trail.peer, time_s) for time_s in trail.times_s])
@@ -95,7 +98,7 @@ def test_the_trace_is_the_truth_about_every_peer(run_folder: Path) -> None:
 
 def test_metrics_follow_from_the_formulas_of_the_mission(run_folder: Path) -> None:
     """Oracle: the same shares from a fine sampling of the formulas, with robot_1 gone while its process was."""
-    metrics = review.review(run_folder)
+    metrics = measure_run(RunFolder(run_folder))
     room = synthetic.environment()
     times = np.arange(0.0, metrics.duration_s, 0.02)
     visible = connected = 0
@@ -118,12 +121,12 @@ def test_metrics_follow_from_the_formulas_of_the_mission(run_folder: Path) -> No
     assert [change.decision for change in metrics.topology_changes] == [2, 3]
 
 
-def test_review_merges_by_itself_when_nobody_has(run_folder: Path, tmp_path: Path) -> None:
+def test_merging_twice_changes_nothing(run_folder: Path, tmp_path: Path) -> None:
     for name in ("mission.json", "map.json"):
         (tmp_path / name).write_bytes((run_folder / name).read_bytes())
     (tmp_path / "recordings").symlink_to(run_folder / "recordings")
-    assert review.review(tmp_path) == review.review(run_folder)
-    assert (tmp_path / "run.rrd").is_file()
+    first, second = conclude(RunFolder(tmp_path)), conclude(RunFolder(tmp_path))
+    assert first == second == measure_run(RunFolder(run_folder))
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -202,12 +205,11 @@ def test_a_recording_that_cannot_be_read_is_one_sentence(run_folder: Path, tmp_p
 
 
 def test_a_recording_of_something_else(tmp_path: Path) -> None:
-    recorder = RerunRecorder(tmp_path / "run.rrd", team="others", recording_id="other", peer="stranger")
-    for time_s, entry in synthetic.tracks("base", 0.0, 0.5):
-        recorder.record(time_s, "stranger", entry)
+    recorder = RerunRecorder(tmp_path / "run.rrd", team="others", recording_id="other", peer="base")
+    recorder.log_map(synthetic.environment())
     recorder.close()
-    with pytest.raises(RecordingFault, match="no record of team demo"):
-        read_trace(tmp_path / "run.rrd", synthetic.mission())
+    with pytest.raises(RecordingFault, match="no record of any peer"):
+        read_records(tmp_path / "run.rrd")
 
 
 def test_without_a_display_a_sentence_says_how_to_look(monkeypatch: pytest.MonkeyPatch) -> None:
