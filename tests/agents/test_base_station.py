@@ -1,0 +1,268 @@
+"""The base station with a planner that does what the test wants."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+import pytest
+from agents.leader import Plan
+from msgspec import structs
+
+from agents.base_station import GRACE_S, BaseStation, silence_s
+from agents.mission import Mission
+from agents.records import Connectivity, Decision, Planned, Track
+from agents.role import Compute, Effect, Heard, JobDone
+from planning.environment import Environment
+from protocol.bus import PeerVanished
+from protocol.keys import Address
+from protocol.messages import AnyBody, Deployment, Envelope, Heartbeat, Intent, Placement, Point, State
+from tests.agents.life import Life
+
+START = (1.0, 1.0)
+CHAIN = (("base", "robot1"), ("robot1", "agent"))
+
+
+def plan(relay: Point = (2.0, 2.0), spare: Point = (3.0, 3.0), edges: Any = CHAIN, serves: bool = True) -> Plan:
+    return Plan(
+        placements=(
+            Placement(robot="robot1", position=relay, cell=4),
+            Placement(robot="robot2", position=spare, spare=True),
+        ),
+        edges=edges, cost=2.0, relays_needed=1, serves=serves, reason=f"{relay} for the agent",
+    )  # fmt: skip
+
+
+class Oracle:
+    """Gives the plan that the test has put there."""
+
+    def __init__(self) -> None:
+        self.answer = plan()
+        self.asked: list[tuple[Point, tuple[Point, ...], dict[str, Point], Plan | None]] = []
+
+    def plan(
+        self, agent: Point, agent_path: Sequence[Point], robots: Mapping[str, Point], previous: Plan | None
+    ) -> Plan:
+        self.asked.append((agent, tuple(agent_path), dict(robots), previous))
+        return self.answer
+
+
+class Team(Life):
+    """A base station, a planner, and peers that speak when the test says so."""
+
+    def __init__(self, mission: Mission, corner: Environment) -> None:
+        self.oracle = Oracle()
+        super().__init__(BaseStation(mission, corner, self.oracle), START)
+        self.speaking = {"agent": (8.0, 2.0), "robot1": (1.0, 2.0), "robot2": (1.0, 3.0)}
+        self.goal: Point | None = None
+        self.planning_takes_s = 0.02
+        self.fails = ""
+
+    def speak(self) -> None:
+        for peer, place in self.speaking.items():
+            body: AnyBody = State(position=place, velocity=(0.0, 0.0), mode="moving")
+            if peer == "agent":
+                path = () if self.goal is None else (place, self.goal)
+                body = Intent(position=place, velocity=(0.0, 0.0), mode="moving", goal=self.goal, path=path)
+            kind = "intent" if peer == "agent" else "state"
+            envelope = Envelope(sender=peer, incarnation=0, sequence=0, sent_at_s=0.0, body=body)
+            self.hear(Heard(Address("team", peer, kind), envelope))
+
+    def go_on(self, seconds: float) -> None:
+        """Let time pass; everybody speaks ten times a second, and jobs end when they should."""
+        for _ in range(round(10 * seconds)):
+            self.speak()
+            step_ends_s = self.now_s + 0.1
+            while self.jobs and self.began_s + self.planning_takes_s <= step_ends_s:
+                self.live_until(max(self.now_s, self.began_s + self.planning_takes_s))
+                job = self.jobs.pop()
+                result = None if self.fails else job.function(*job.arguments)
+                self.hear(JobDone(job.job, result, self.planning_takes_s, self.fails))
+            self.live_until(step_ends_s)
+
+    def do(self, effects: Sequence[Effect]) -> None:
+        super().do(effects)
+        if any(isinstance(effect, Compute) for effect in effects):
+            assert len(self.jobs) == 1
+            self.began_s = self.now_s
+
+    @property
+    def deployments(self) -> list[tuple[float, Deployment]]:
+        return self.all_said(Deployment)
+
+    @property
+    def decisions(self) -> list[Decision]:
+        return [record for record in self.records if isinstance(record, Decision)]
+
+    @property
+    def connectivity(self) -> Connectivity:
+        return [record for record in self.records if isinstance(record, Connectivity)][-1]
+
+
+@pytest.fixture
+def team(mission: Mission, corner: Environment) -> Team:
+    return Team(mission, corner)
+
+
+def test_first_deployment_goes_out_as_soon_as_everybody_is_heard(team: Team) -> None:
+    team.go_on(0.3)
+    assert team.deployments[0][0] == pytest.approx(0.02)
+    assert team.oracle.asked[0] == ((8.0, 2.0), (), {"robot1": (1.0, 2.0), "robot2": (1.0, 3.0)}, None)
+
+
+def test_first_deployment_waits_for_latecomers_but_not_for_ever(team: Team) -> None:
+    del team.speaking["robot2"]
+    team.go_on(3.0)
+    assert team.deployments[0][0] == pytest.approx(GRACE_S, abs=0.13)
+    assert set(team.oracle.asked[0][2]) == {"robot1"}
+
+
+def test_nothing_is_planned_without_an_agent(team: Team) -> None:
+    del team.speaking["agent"]
+    team.go_on(5.0)
+    assert not team.oracle.asked
+    assert not team.deployments
+
+
+def test_a_decision_that_stands_is_repeated_with_a_rising_sequence(team: Team, mission: Mission) -> None:
+    team.go_on(10.0)
+    assert len(team.decisions) == 1
+    times_s = [time_s for time_s, _ in team.deployments]
+    assert max(b - a for a, b in pairwise(times_s)) <= mission.valid_for_s / 4 + 1e-6
+    sequences = [deployment.authority.sequence for _, deployment in team.deployments]
+    assert sequences == sorted(set(sequences))
+    assert {deployment.decision for _, deployment in team.deployments} == {1}
+    assert len(team.oracle.asked) == pytest.approx(20, abs=1)
+    assert sum(isinstance(record, Planned) for record in team.records) == len(team.oracle.asked)
+
+
+def test_the_plan_before_is_given_to_the_planner(team: Team) -> None:
+    team.go_on(1.2)
+    assert [asked[3] for asked in team.oracle.asked[:2]] == [None, team.oracle.answer]
+
+
+def test_spares_that_move_are_no_new_decision(team: Team) -> None:
+    team.go_on(1.0)
+    team.oracle.answer = plan(spare=(4.0, 4.0))
+    team.go_on(1.0)
+    assert len(team.decisions) == 1
+    assert team.deployments[-1][1].placements == team.oracle.answer.placements
+    assert team.deployments[-1][1].reason == team.deployments[0][1].reason
+
+
+def test_a_relay_that_moves_is_a_decision_and_a_new_link_changes_the_topology(team: Team) -> None:
+    team.go_on(1.0)
+    team.oracle.answer = plan(relay=(4.0, 4.0))
+    team.go_on(1.0)
+    team.oracle.answer = plan(relay=(4.0, 4.0), edges=(("base", "robot1"), ("base", "agent")))
+    team.go_on(1.0)
+    assert [decision.topology_changed for decision in team.decisions] == [False, False, True]
+    assert [decision.deployment.decision for decision in team.decisions] == [1, 2, 3]
+
+
+def test_plans_at_once_when_the_agent_has_a_new_goal(team: Team) -> None:
+    team.go_on(5.2)
+    before = len(team.oracle.asked)
+    team.goal = (9.0, 1.0)
+    team.go_on(0.1)
+    assert len(team.oracle.asked) == before + 1
+    assert team.oracle.asked[-1][1] == ((8.0, 2.0), (9.0, 1.0))
+
+
+@pytest.mark.parametrize("vanishes", [True, False])
+def test_plans_without_a_robot_that_is_lost_and_with_it_when_it_is_back(
+    team: Team, mission: Mission, vanishes: bool
+) -> None:
+    team.go_on(5.2)
+    place = team.speaking.pop("robot1")
+    if vanishes:
+        team.hear(PeerVanished("robot1"))
+        team.go_on(0.1)
+    else:
+        team.go_on(silence_s(mission.control_hz) + 0.2)
+    assert set(team.oracle.asked[-1][2]) == {"robot2"}
+    assert not team.connectivity.team_connected
+    team.speaking["robot1"] = place
+    team.go_on(0.1)
+    assert set(team.oracle.asked[-1][2]) == {"robot1", "robot2"}
+    assert [line.level for line in team.logs].count("warning") == 1
+
+
+def test_one_job_at_a_time_however_long_it_takes(team: Team) -> None:
+    team.planning_takes_s = 0.35
+    for step in range(20):
+        team.goal = (9.0, 1.0 + 0.1 * step)
+        team.go_on(0.1)
+    assert len(team.oracle.asked) <= 7
+
+
+def test_a_failed_plan_is_logged_and_the_last_deployment_stands(team: Team) -> None:
+    team.go_on(1.0)
+    team.fails = "ValueError: no"
+    team.go_on(2.0)
+    assert {line.text for line in team.logs if line.level == "error"} == {
+        "planning failed, the last deployment stands: ValueError: no"
+    }
+    assert team.deployments[-1][0] > 2.0
+    assert len(team.decisions) == 1
+
+
+def test_a_plan_that_does_not_serve_is_said_once(team: Team) -> None:
+    team.go_on(1.0)
+    team.oracle.answer = plan(serves=False)
+    team.go_on(2.0)
+    team.oracle.answer = plan()
+    team.go_on(1.0)
+    assert [line.level for line in team.logs] == ["info"] * 3 + ["warning", "info"]
+
+
+def test_an_incarnation_that_starts_later_outranks_those_before(mission: Mission, corner: Environment) -> None:
+    epochs = []
+    for start_s in (0.0, 7.5):
+        role = BaseStation(mission, corner, Oracle())
+        role.start(start_s, START)
+        epochs.append(role._epoch)
+    assert epochs[0] < epochs[1]
+
+
+def test_says_where_it_is_and_that_it_lives(team: Team) -> None:
+    team.go_on(2.0)
+    assert len(team.all_said(State)) == 21
+    assert len(team.all_said(Heartbeat)) == 5
+    assert sum(isinstance(record, Track) for record in team.records) == 21
+    assert {body.position for _, body in team.all_said(State)} == {START}
+
+
+def test_connectivity_is_true_line_of_sight_between_the_places_heard(team: Team) -> None:
+    team.speaking = {"agent": (2.0, 9.0), "robot1": (9.0, 2.0), "robot2": (2.0, 2.0)}
+    team.oracle.answer = plan(edges=(("base", "robot1"), ("robot1", "agent")))
+    team.go_on(0.5)
+    seen = team.connectivity
+    # Everybody sees everybody but agent and robot1: the complete graph less one link has λ2 = n − 2.
+    assert len(seen.links) == 5
+    assert ((2.0, 9.0), (9.0, 2.0)) not in seen.links
+    assert (seen.agent_visible, seen.chain_connected, seen.team_connected) == (True, True, True)
+    assert seen.lambda2 == pytest.approx(2.0)
+    assert seen.tree_links == ((START, (9.0, 2.0)), ((9.0, 2.0), (2.0, 9.0)))
+
+
+def test_visible_is_less_than_connected(mission: Mission, corner: Environment) -> None:
+    base = structs.replace(mission.roster[0], start=(9.0, 4.0))
+    team = Team(structs.replace(mission, roster=(base, *mission.roster[1:])), corner)
+    team.role._position = (9.0, 4.0)  # type: ignore[attr-defined]
+    team.driver = type(team.driver)((9.0, 4.0), 0.0)
+    team.speaking = {"agent": (2.0, 9.0), "robot1": (4.0, 9.0), "robot2": (3.0, 9.0)}
+    team.go_on(0.5)
+    seen = team.connectivity
+    assert (seen.agent_visible, seen.chain_connected, seen.team_connected) == (True, False, False)
+    assert seen.lambda2 == 0.0
+
+
+def test_without_the_agent_nothing_is_connected(team: Team) -> None:
+    team.go_on(0.5)
+    team.hear(PeerVanished("agent"))
+    del team.speaking["agent"]
+    team.go_on(0.3)
+    seen = team.connectivity
+    assert (seen.agent_visible, seen.chain_connected, seen.team_connected) == (False, False, False)
