@@ -154,7 +154,7 @@ def _is_tangent(vertices: Floats, after: Ints, before: Ints, v: int, ux: float, 
     x, y = vertices[v, 0], vertices[v, 1]
     side_b = ux * (vertices[after[v], 1] - y) - uy * (vertices[after[v], 0] - x)
     side_c = ux * (vertices[before[v], 1] - y) - uy * (vertices[before[v], 0] - x)
-    return (side_b > tolerance and side_c > tolerance) or (side_b < -tolerance and side_c < -tolerance)
+    return bool((side_b > tolerance and side_c > tolerance) or (side_b < -tolerance and side_c < -tolerance))
 
 
 @njit(cache=True, nogil=True)

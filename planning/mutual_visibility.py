@@ -32,6 +32,13 @@ Bools = NDArray[np.bool_]
 SHRINKAGE = 1e-6
 """Smaller is less forgiving towards rounding: 1e-9 loses edges between slivers."""
 
+MOST_CELLS = 20_000
+"""Above this the graph alone takes hundreds of megabytes, and what is computed from it gigabytes."""
+
+
+class TooManyCells(ValueError):
+    """More cells than a mutual visibility graph is made for; the text is one sentence with map and remedy."""
+
 
 def mutual_visibility(cells: Cells) -> csr_array:
     """The mutual visibility graph Q of thesis §3.2.1.
@@ -39,10 +46,18 @@ def mutual_visibility(cells: Cells) -> csr_array:
     Returns:
         (N, N) bool, symmetric, True on the diagonal.
 
+    Raises:
+        TooManyCells: more than `MOST_CELLS`.
+
     Complexity: O(N² V) for N cells and V walls, of which a hidden pair mostly costs O(1).
     """
     environment, frame = cells.environment, cells.frame
     n = len(cells)
+    if n > MOST_CELLS:
+        raise TooManyCells(
+            f"{environment.name or 'the map'} has {n} {cells.kind} cells, more than the {MOST_CELLS} that a mutual "
+            f"visibility graph is made for: use inflection cells, shorter bitangents or a simpler map"
+        )
     centroids = measure_cells(cells.unit_corners, cells.starts)[1]
     centre = np.repeat(centroids, np.diff(cells.starts), axis=0)
     shrunk = centre + (1.0 - SHRINKAGE) * (cells.unit_corners - centre)
@@ -83,7 +98,7 @@ def _crosses(walls: Floats, w: int, px: float, py: float, qx: float, qy: float) 
     ax, ay, bx, by = walls[w, 0], walls[w, 1], walls[w, 2], walls[w, 3]
     if _side(ax, ay, bx, by, qx, qy) >= 0.0 or _side(ax, ay, bx, by, px, py) <= 0.0:
         return False
-    return (_side(px, py, qx, qy, ax, ay) > 0.0) != (_side(px, py, qx, qy, bx, by) > 0.0)
+    return bool((_side(px, py, qx, qy, ax, ay) > 0.0) != (_side(px, py, qx, qy, bx, by) > 0.0))
 
 
 @njit(cache=True, nogil=True)
@@ -134,7 +149,11 @@ def _find_obstacle(
             return w
         if start_right != end_right and _crosses(walls, w, cx, cy, dx, dy):
             return w
-        if not (start_left or start_right) and _side(cx, cy, ax, ay, x, y) <= 0.0 and _side(dx, dy, bx, by, x, y) >= 0.0:
+        if (
+            not (start_left or start_right)
+            and _side(cx, cy, ax, ay, x, y) <= 0.0
+            and _side(dx, dy, bx, by, x, y) >= 0.0
+        ):
             return w
     return -1
 
