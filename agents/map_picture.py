@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 Floats: TypeAlias = NDArray[np.float64]
 Colour: TypeAlias = tuple[int, int, int]
 
-LONG_SIDE_PIXELS = 1600
+LONG_SIDE_PIXELS = 1200
 _SUPERSAMPLING = 2
 _MARGIN_PIXELS = 2
 
@@ -44,7 +44,7 @@ def draw_map(environment: Environment, cell_polygons: Sequence[Floats] = ()) -> 
         environment: the map.
         cell_polygons: (m, 2) float rings, metres, map frame; may be empty.
 
-    The longer side of the bounds takes :data:`LONG_SIDE_PIXELS`. Linear in pixels and vertices; tens of milliseconds.
+    The longer side of the bounds takes :data:`LONG_SIDE_PIXELS`. Linear in pixels and vertices; about 0.1 s.
     """
     x_min, y_min, x_max, y_max = environment.bounds
     scale = max(x_max - x_min, y_max - y_min) / LONG_SIDE_PIXELS
