@@ -152,14 +152,12 @@ class PeerShell:
             self._log("warning", f"refused a {reason} message under {key[:200]}; further ones are only counted")
 
     def _tell(self, event: Event) -> None:
-        """Give the role an event. Whatever it raises costs this event and nothing else."""
-        effects: Sequence[Effect] = ()
+        """Give the role an event. Whatever fails on it costs this event and nothing else."""
         try:
-            effects = self._role.handle(event, self._now())
+            self._carry_out(self._role.handle(event, self._now()))
         except Exception as problem:
             self.faults += 1
             self._log("error", f"failed on {_describe(event)}: {type(problem).__name__}: {problem}"[:500])
-        self._carry_out(effects)
 
     def _carry_out(self, effects: Sequence[Effect]) -> None:
         for effect in effects:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
@@ -26,7 +27,7 @@ UNTIL_TOLD_S: Final = 60.0
 
 
 class SimulatedPeer:
-    """A shell in virtual time: sleeps until it is due, computes inline and lets the result wait for its delay."""
+    """A peer in virtual time: sleeps until it is due, computes inline and lets the result wait for its delay."""
 
     def __init__(
         self,
@@ -38,30 +39,33 @@ class SimulatedPeer:
         record: Callable[[float, str, AnyRecord], None],
     ) -> None:
         self._time = time
-        self._delay_s = mission.planning_delay_s
-        self._due_s = -1.0
-        role, driver = casting.cast(name)
-        self.shell = PeerShell(
-            role,
-            driver,
-            network.attach(name, self._take),
-            name=name,
-            team=mission.team,
-            incarnation=0,
-            peers=[entry.name for entry in mission.roster],
-            now=lambda: time.now_s,
-            wall_clock=lambda: mission.epoch_unix_s + time.now_s,
-            record=lambda time_s, what: record(time_s, name, what),
-            execute=self._execute,
-        )
+        self._network = network
+        self._mission = mission
+        self._name = name
+        self._record = record
+        self._role, self._driver = casting.cast(name)
+        self._due_s = math.inf
 
     def start(self) -> None:
-        """Let the role begin."""
-        self.shell.start()
+        """Join the network and let the role begin."""
+        self._shell = PeerShell(
+            self._role,
+            self._driver,
+            self._network.attach(self._name, self._take),
+            name=self._name,
+            team=self._mission.team,
+            incarnation=0,
+            peers=[entry.name for entry in self._mission.roster],
+            now=lambda: self._time.now_s,
+            wall_clock=lambda: self._mission.epoch_unix_s + self._time.now_s,
+            record=lambda time_s, record: self._record(time_s, self._name, record),
+            execute=self._execute,
+        )
+        self._shell.start()
         self._sleep()
 
     def _take(self, event: BusEvent) -> None:
-        self.shell.take(event)
+        self._shell.take(event)
         self._sleep()
 
     def _execute(self, job: Compute) -> None:
@@ -70,23 +74,23 @@ class SimulatedPeer:
             result = job.function(*job.arguments)
         except Exception as problem:
             failure = f"{type(problem).__name__}: {problem}"
-        done = JobDone(job.job, result, self._delay_s, failure)
-        self._time.call_at(self._time.now_s + self._delay_s, self._finish, done)
+        delay_s = self._mission.planning_delay_s
+        self._time.call_at(self._time.now_s + delay_s, self._finish, JobDone(job.job, result, delay_s, failure))
 
     def _finish(self, done: JobDone) -> None:
-        self.shell.finish(done)
+        self._shell.finish(done)
         self._sleep()
 
     def _sleep(self) -> None:
         """Have :meth:`_wake` called when the shell is due; calls for times no longer wished for find that out."""
-        if self.shell.wake_at_s != self._due_s:
-            self._due_s = self.shell.wake_at_s
+        if self._shell.wake_at_s != self._due_s:
+            self._due_s = self._shell.wake_at_s
             self._time.call_at(self._due_s, self._wake, self._due_s)
 
     def _wake(self, due_s: float) -> None:
         if due_s == self._due_s:
-            self._due_s = -1.0
-            self.shell.wake()
+            self._due_s = math.inf
+            self._shell.wake()
             self._sleep()
 
 

@@ -1,0 +1,160 @@
+"""Whole missions in virtual time, judged by what their traces must satisfy."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+from msgspec import structs
+
+import maps
+from agents.mission import Behaviour, Mission, RosterEntry, Scripted, Wandering
+from agents.records import AnyRecord, Connectivity
+from launcher.report import MissionTrace, measure
+from launcher.simulation import simulate
+from planning.environment import Environment
+from protocol.messages import Point
+
+ROOT = Path(__file__).resolve().parents[2]
+
+CORNER = Environment([(0, 0), (12, 0), (12, 3), (3, 3), (3, 12), (0, 12)], name="corner")
+"""Two corridors that meet at a right angle: from the end of one to the end of the other takes one relay."""
+
+
+def team(behaviour: Behaviour, base: Point, agent: Point, robots: list[Point], seed: int = 1) -> Mission:
+    return Mission(
+        team="team",
+        map_path="map.json",
+        roster=(
+            RosterEntry(name="base", role="base_station", start=base),
+            RosterEntry(name="agent", role="tracked_agent", start=agent),
+            *(RosterEntry(name=f"robot{n}", role="robot", start=start) for n, start in enumerate(robots, 1)),
+        ),
+        behaviour=behaviour,
+        robot_radius_m=0.2,
+        agent_radius_m=0.2,
+        robot_speed_m_s=1.2,
+        agent_speed_m_s=0.8,
+        control_hz=10.0,
+        heartbeat_hz=2.0,
+        planning_period_s=0.5,
+        valid_for_s=3.0,
+        decomposition="inflection",
+        duration_s=30.0,
+        seed=seed,
+        epoch_unix_s=0.0,
+    )
+
+
+def around_the_corner(behaviour: Behaviour | None = None) -> Mission:
+    walk = Scripted(goals=((11.0, 1.5),), pause_s=1.0, start_after_s=3.0)
+    return team(behaviour or walk, (1.5, 11.0), (1.5, 9.0), [(0.7, 11.0), (2.3, 11.0)])
+
+
+def digest(trace: MissionTrace) -> str:
+    content = hashlib.sha256()
+    for trail in trace.trails:
+        content.update(trail.times_s.tobytes() + trail.positions.tobytes())
+    content.update(msgspec.json.encode((trace.decisions, trace.planning_s, trace.logs)))
+    return content.hexdigest()
+
+
+class Keeper:
+    """A recorder in memory."""
+
+    def __init__(self) -> None:
+        self.records: list[tuple[float, str, AnyRecord]] = []
+
+    def record(self, time_s: float, peer: str, record: AnyRecord) -> None:
+        self.records.append((time_s, peer, record))
+
+    def close(self) -> None:
+        pass
+
+
+def test_a_chain_of_one_relay_follows_the_agent_around_a_corner() -> None:
+    mission = around_the_corner()
+    trace = simulate(mission, CORNER)
+    trails = {trail.peer: trail for trail in trace.trails}
+    assert tuple(trails["agent"].positions[-1]) == pytest.approx((11.0, 1.5))
+    _, last = trace.decisions[-1]
+    relays = [place for place in last.deployment.placements if not place.spare]
+    assert len(relays) == last.deployment.relays_needed == 1
+    for relay in relays:
+        assert tuple(trails[relay.robot].positions[-1]) == pytest.approx(relay.position, abs=1e-6)
+        assert CORNER.line_of_sight(relay.position, mission.base_station.start)
+        assert CORNER.line_of_sight(relay.position, (11.0, 1.5))
+    metrics = measure(trace, CORNER)
+    assert metrics.errors == 0
+    assert metrics.first_deployment_s is not None
+    assert metrics.first_deployment_s < 1.0
+    assert metrics.since_first_deployment is not None
+    assert metrics.since_first_deployment.chain_connected > 0.97
+
+
+def test_what_the_base_believes_of_the_chain_is_what_the_tracks_say() -> None:
+    keeper = Keeper()
+    trace = simulate(around_the_corner(), CORNER, recorder=keeper)
+    believed = [record.chain_connected for _, _, record in keeper.records if isinstance(record, Connectivity)]
+    assert np.mean(believed) == pytest.approx(measure(trace, CORNER).whole_run.chain_connected, abs=0.02)
+    assert [record for _, peer, record in keeper.records if peer == "base"]
+
+
+@pytest.mark.parametrize(("name", "seed"), [("office", 1), ("room3", 2), ("maze", 3)])
+def test_bodies_keep_to_free_space_and_to_their_speed(name: str, seed: int) -> None:
+    environment = Environment.load(maps.path(name))
+    free = environment.inflated(0.2)
+    chance = np.random.default_rng(seed)
+    west, south, east, north = free.bounds
+    places = chance.uniform((west, south), (east, north), (4000, 2))
+    base, *others = map(tuple, places[free.contains(places)].tolist())
+    near = [place for place in others if environment.line_of_sight(base, place)][:5]
+    mission = team(Wandering(start_after_s=1.0), base, near[0], near[1:], seed)
+    trace = simulate(mission, environment, duration_s=40.0)
+    room = environment.inflated(0.2 - 2e-3, containing=base)
+    assert not [line for _, _, line in trace.logs if line.level == "error"]
+    for trail in trace.trails:
+        limit_m_s = {"robot": 1.2, "tracked_agent": 0.8, "base_station": 0.0}[trail.role]
+        assert len(trail.times_s) == pytest.approx(400, abs=2)
+        if trail.role != "base_station":
+            assert room.contains(trail.positions).all(), f"{trail.peer} on {name}, seed {seed}"
+        steps_m = np.hypot(*np.diff(trail.positions, axis=0).T)
+        assert (steps_m <= limit_m_s * np.diff(trail.times_s) + 1e-6).all()
+    metrics = measure(trace, environment)
+    assert metrics.agent_distance_m > 10.0
+    assert metrics.total_distance_m > 5.0
+
+
+def test_equal_seeds_give_equal_traces_to_the_last_bit() -> None:
+    mission = around_the_corner(Wandering(start_after_s=0.5))
+    traces = [simulate(mission, CORNER, duration_s=20.0, seed=seed) for seed in (5, 5, 6)]
+    assert digest(traces[0]) == digest(traces[1]) != digest(traces[2])
+
+
+def test_the_seed_decides_and_not_the_hashes_of_python() -> None:
+    program = (
+        "from tests.launcher.test_simulation import *\n"
+        "print(digest(simulate(around_the_corner(Wandering(start_after_s=0.5)), CORNER, duration_s=10.0)))"
+    )
+    digests = set()
+    for hash_seed in ("1", "2"):
+        environment = {**os.environ, "PYTHONHASHSEED": hash_seed}
+        done = subprocess.run(
+            [sys.executable, "-c", program], cwd=ROOT, env=environment, capture_output=True, text=True, check=True
+        )
+        digests.add(done.stdout)
+    assert len(digests) == 1
+
+
+def test_lasts_as_long_as_it_is_told() -> None:
+    mission = structs.replace(around_the_corner(), duration_s=4.0)
+    assert simulate(mission, CORNER).duration_s == 4.0
+    trace = simulate(mission, CORNER, duration_s=2.0)
+    assert trace.duration_s == 2.0
+    assert max(float(trail.times_s[-1]) for trail in trace.trails) <= 2.0
