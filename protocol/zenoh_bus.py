@@ -56,6 +56,8 @@ class ZenohBus:
         self._deliver = deliver
         self._open = True
         self._declared: list[Any] = []
+        self._leaving = threading.Event()
+        self._left = threading.Event()
 
     @classmethod
     def open(
@@ -96,7 +98,8 @@ class ZenohBus:
             raise BusUnavailable(_explanation(listen, others, str(problem))) from problem
         bus = cls(session, team, name, deliver)
         bus._declare(token=not operator)
-        threading.Thread(target=bus._close_with_main_thread, name="zenoh end").start()
+        threading.Thread(target=bus._leave, name="zenoh bus leaves", daemon=True).start()
+        threading.Thread(target=bus._close_with_main_thread, name="zenoh bus ends").start()
         return bus
 
     def publish(self, key: str, payload: bytes) -> None:
@@ -115,12 +118,9 @@ class ZenohBus:
 
     def close(self) -> None:
         """Take the token back and leave. Returns within a second or so; a second call does nothing."""
-        if not self._open:
-            return
         self._open = False
-        closing = threading.Thread(target=self._leave, name="zenoh close", daemon=True)
-        closing.start()
-        closing.join(CLOSE_WITHIN_S)
+        self._leaving.set()
+        self._left.wait(CLOSE_WITHIN_S)
 
     def _declare(self, *, token: bool) -> None:
         session = self._session
@@ -134,16 +134,21 @@ class ZenohBus:
             self._declared.append(liveliness.declare_token(own))
 
     def _close_with_main_thread(self) -> None:
-        # zenoh calls back from Python threads that the interpreter waits for before it does anything else, functions of
-        # atexit included: a process that ends without close() would wait for ever. This thread is waited for as well,
-        # since one that is cut off within zenoh takes the process down.
+        """Let no process wait for ever that ends without :meth:`close`.
+
+        zenoh calls back from Python threads that the interpreter waits for before it does anything else, functions of
+        ``atexit`` included. It waits for this thread as well, and starts no new ones by then.
+        """
         threading.main_thread().join()
         self.close()
 
     def _leave(self) -> None:
+        """Wait for :meth:`close`, then do what may hang, in a thread that nobody waits for any longer than that."""
+        self._leaving.wait()
         for declared in reversed(self._declared):  # the token first
             declared.undeclare()
         self._session.close()
+        self._left.set()
 
     def _hear(self, sample: Any) -> None:
         if not self._open or sample.kind != zenoh.SampleKind.PUT:
