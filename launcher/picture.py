@@ -24,6 +24,7 @@ Floats = NDArray[np.float64]
 _FORMATS = (".pdf", ".png", ".svg")
 _LONG_SIDE_IN = 9.0
 _SHORT_SIDE_IN = 3.0
+_LONGEST_SIDE_IN = 18.0
 _DOTS_PER_IN = 160
 
 _SOLID = "#b9c0c9"
@@ -90,7 +91,9 @@ def draw_plan(
     _draw_peers(axes, [base], "s", _BASE, "base", ["B"])
     _draw_peers(axes, relays, "o", _RELAY, "relay", [str(number) for number in range(1, len(relays) + 1)])
     _draw_peers(axes, agents, "D", _AGENT, "agent", ["A"] * len(agents))
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.09), ncols=4, frameon=False, fontsize=8)
+    axes.legend(
+        loc="upper center", bbox_to_anchor=(0.5, -0.5 / figure.get_figheight()), ncols=4, frameon=False, fontsize=8
+    )
     _write(figure, file)
 
 
@@ -108,7 +111,8 @@ def _draw_floor(
     left, low, right, high = environment.bounds
     margin = 0.02 * max(right - left, high - low)
     width, height = right - left + 2 * margin, high - low + 2 * margin
-    scale = max(_LONG_SIDE_IN / max(width, height), _SHORT_SIDE_IN / min(width, height))
+    wanted = max(_LONG_SIDE_IN / max(width, height), _SHORT_SIDE_IN / min(width, height))
+    scale = min(wanted, _LONGEST_SIDE_IN / max(width, height))
     figure = Figure(figsize=(width * scale, height * scale))
     axes = figure.add_axes((0, 0, 1, 1))
     axes.set(xlim=(left - margin, right + margin), ylim=(low - margin, high + margin), aspect="equal")
@@ -121,7 +125,7 @@ def _draw_floor(
             PolyCollection(list(polygons), facecolors="none", edgecolors=_CELL, linewidths=0.35, zorder=2)
         )
     axes.add_patch(PathPatch(walls, facecolor="none", edgecolor=_WALL, linewidth=1.2, joinstyle="miter", zorder=3))
-    axes.set_title(title, fontsize=11, loc="left", pad=8)
+    axes.set_title(title, fontsize=11, loc="left", pad=8, parse_math=False)
     axes.set_xlabel("x [m]", fontsize=8)
     axes.set_ylabel("y [m]", fontsize=8)
     axes.tick_params(labelsize=8, length=3)
