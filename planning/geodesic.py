@@ -140,22 +140,19 @@ class GeodesicMap:
 
 
 @kernel
-def _is_tangent(px: float, py: float, corner: Floats, tolerance: float) -> bool:
-    """Whether the segment from p to a reflex vertex could go straight on: its neighbours lie on one side of the line.
+def _is_tangent(px: float, py: float, corners: Floats, i: int, tolerance: float) -> bool:
+    """Whether the segment from p to reflex vertex i could go straight on: its neighbours lie on one side of the line.
 
     p is known to ± tolerance, so the line beyond the vertex is known the worse the nearer p is; in doubt the answer is
     yes, which costs time and never a path.
     """
-    vx, vy = corner[1, 0], corner[1, 1]
+    vx, vy = corners[i, 1, 0], corners[i, 1, 1]
     ux, uy = vx - px, vy - py
-    length = math.hypot(ux, uy)
-    if length <= tolerance:
-        return True
     left = right = True
-    for k in (0, 2):
-        wx, wy = corner[k, 0] - vx, corner[k, 1] - vy
-        side = (ux * wy - uy * wx) / length
-        doubt = tolerance * (1.0 + math.hypot(wx, wy) / length)
+    for k in range(0, 3, 2):
+        wx, wy = corners[i, k, 0] - vx, corners[i, k, 1] - vy
+        side = ux * wy - uy * wx
+        doubt = tolerance * (abs(ux) + abs(uy) + abs(wx) + abs(wy))
         left = left and side >= -doubt
         right = right and side <= doubt
     return left or right
@@ -171,8 +168,8 @@ def _join_corners(corners: Floats, walls: Floats, tolerance: float) -> Floats:
         for j in range(i + 1, r):
             qx, qy = corners[j, 1, 0], corners[j, 1, 1]
             if (
-                _is_tangent(px, py, corners[j], tolerance)
-                and _is_tangent(qx, qy, corners[i], tolerance)
+                _is_tangent(px, py, corners, j, tolerance)
+                and _is_tangent(qx, qy, corners, i, tolerance)
                 and free_points_see(px, py, qx, qy, walls, tolerance)
             ):
                 edges[i, j] = edges[j, i] = math.hypot(qx - px, qy - py)
@@ -193,7 +190,7 @@ def _reach_corners(
         # A vertex that is reached no later over another one adds nothing.
         if (
             leg < reached[i]
-            and _is_tangent(start[0], start[1], corners[i], tolerance)
+            and _is_tangent(start[0], start[1], corners, i, tolerance)
             and free_points_see(start[0], start[1], vx, vy, walls, tolerance)
         ):
             for j in range(r):
@@ -207,20 +204,22 @@ def _reach_corners(
 def _finish(end: Floats, reached: Floats, corners: Floats, walls: Floats, tolerance: float) -> tuple[float, int]:
     """Length of the shortest path over reached reflex vertices to a point, and its last bend.
 
-    Visibility is asked only where it would make the path shorter.
+    Vertices are tried in the order of the lengths that they promise: the first that the point sees is the answer.
     """
-    best = np.inf
-    last = -1
+    promised = np.empty(corners.shape[0])
     for j in range(corners.shape[0]):
-        vx, vy = corners[j, 1, 0], corners[j, 1, 1]
-        length = reached[j] + math.hypot(end[0] - vx, end[1] - vy)
-        if (
-            length < best
-            and _is_tangent(end[0], end[1], corners[j], tolerance)
-            and free_points_see(vx, vy, end[0], end[1], walls, tolerance)
-        ):
-            best, last = length, j
-    return best, last
+        if _is_tangent(end[0], end[1], corners, j, tolerance):
+            promised[j] = reached[j] + math.hypot(end[0] - corners[j, 1, 0], end[1] - corners[j, 1, 1])
+        else:
+            promised[j] = np.inf
+    while True:
+        j = np.argmin(promised)
+        length = promised[j]
+        if length == np.inf:
+            return length, -1
+        if free_points_see(corners[j, 1, 0], corners[j, 1, 1], end[0], end[1], walls, tolerance):
+            return length, j
+        promised[j] = np.inf
 
 
 @kernel

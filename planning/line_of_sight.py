@@ -24,10 +24,7 @@ from planning.kernel import kernel
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
-
-_BLOCKED = 0
-_CLEAR = 1
-_TOUCHES = 2
+Ints = NDArray[np.int64]
 
 
 @kernel
@@ -55,11 +52,12 @@ def point_is_free(x: float, y: float, walls: Floats, tolerance: float) -> bool:
 
 
 @kernel
-def _meet_walls(px: float, py: float, qx: float, qy: float, walls: Floats, tolerance: float) -> int:
-    """Whether the segment is blocked by a wall that it clearly crosses, clear of all walls, or touches some."""
-    length = math.hypot(qx - px, qy - py)
-    ux, uy = (qx - px) / length, (qy - py) / length
-    touches = False
+def _find_touches(px: float, py: float, qx: float, qy: float, walls: Floats, tolerance: float, touching: Ints) -> int:
+    """Write the walls that the segment touches into ``touching`` (w,); their number, or −1 if a wall clearly blocks."""
+    ux, uy = qx - px, qy - py
+    length = math.sqrt(ux * ux + uy * uy)
+    ux, uy = ux / length, uy / length
+    n = 0
     for i in range(walls.shape[0]):
         ax, ay = walls[i, 0, 0], walls[i, 0, 1]
         bx, by = walls[i, 1, 0], walls[i, 1, 1]
@@ -68,32 +66,33 @@ def _meet_walls(px: float, py: float, qx: float, qy: float, walls: Floats, toler
         if (da > tolerance and db > tolerance) or (da < -tolerance and db < -tolerance):
             continue
         wx, wy = bx - ax, by - ay
-        reach = tolerance * math.hypot(wx, wy)
+        reach = tolerance * math.sqrt(wx * wx + wy * wy)
         ep = wx * (py - ay) - wy * (px - ax)
         eq = wx * (qy - ay) - wy * (qx - ax)
         if (ep > reach and eq > reach) or (ep < -reach and eq < -reach):
             continue
         if min(abs(da), abs(db)) > tolerance and min(abs(ep), abs(eq)) > reach:
-            return _BLOCKED
-        touches = True
-    return _TOUCHES if touches else _CLEAR
+            return -1
+        touching[n] = i
+        n += 1
+    return n
 
 
 @kernel
-def _pieces_are_free(px: float, py: float, qx: float, qy: float, walls: Floats, tolerance: float) -> bool:
-    """Whether the middle of every piece between the segment's touches is free; no wall clearly crosses it."""
+def _pieces_are_free(
+    px: float, py: float, qx: float, qy: float, walls: Floats, tolerance: float, touching: Ints
+) -> bool:
+    """Whether the middle of every piece between the segment's touches is free; no wall clearly blocks it."""
     vx, vy = qx - px, qy - py
-    length = math.hypot(vx, vy)
-    cuts = np.empty(2 + 3 * walls.shape[0])
+    length = math.sqrt(vx * vx + vy * vy)
+    cuts = np.empty(2 + 3 * len(touching))
     cuts[0], cuts[1] = 0.0, 1.0
     n = 2
-    for i in range(walls.shape[0]):
+    for i in touching:
         ax, ay = walls[i, 0, 0], walls[i, 0, 1]
         bx, by = walls[i, 1, 0], walls[i, 1, 1]
         da = (vx * (ay - py) - vy * (ax - px)) / length
         db = (vx * (by - py) - vy * (bx - px)) / length
-        if (da > tolerance and db > tolerance) or (da < -tolerance and db < -tolerance):
-            continue
         if abs(da) <= tolerance:
             cuts[n] = (vx * (ax - px) + vy * (ay - py)) / (length * length)
             n += 1
@@ -118,11 +117,15 @@ def _pieces_are_free(px: float, py: float, qx: float, qy: float, walls: Floats, 
 
 @kernel
 def free_points_see(px: float, py: float, qx: float, qy: float, walls: Floats, tolerance: float) -> bool:
-    """Whether two points known to lie in the closed free space see each other. O(w) unless the segment touches."""
+    """Whether two points known to lie in the closed free space see each other.
+
+    O(w), and O(w) more for each piece that touches cut the segment into.
+    """
     if math.hypot(qx - px, qy - py) <= tolerance:
         return True
-    meeting = _meet_walls(px, py, qx, qy, walls, tolerance)
-    return meeting == _CLEAR or (meeting == _TOUCHES and _pieces_are_free(px, py, qx, qy, walls, tolerance))
+    touching = np.empty(walls.shape[0], np.int64)
+    n = _find_touches(px, py, qx, qy, walls, tolerance, touching)
+    return n == 0 or (n > 0 and _pieces_are_free(px, py, qx, qy, walls, tolerance, touching[:n]))
 
 
 @kernel
