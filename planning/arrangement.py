@@ -105,20 +105,20 @@ def _place_points(
     length = np.hypot(span[:, 0], span[:, 1])
     wall_direction = span / length[:, None]
 
+    origin = vertices[lines.base]
     line, end = np.nonzero(lines.end_wall != NONE)
     host = lines.end_wall[line, end]
     t = lines.reach[line, end]
-    ends = vertices[lines.base[line]] + t[:, None] * lines.direction[line]
+    ends = origin[line] + t[:, None] * lines.direction[line]
     end_name = len(vertices) + np.arange(len(ends))
     t_host = ((ends - vertices[host]) * wall_direction[host]).sum(axis=1)
 
-    touching = _find_incidences(vertices, vertices[lines.base], lines.direction, lines.reach, tolerance)
+    touching = _find_incidences(vertices, origin, lines.direction, lines.reach, tolerance)
     on_line, vertex = np.nonzero(touching)
-    t_vertex = ((vertices[vertex] - vertices[lines.base[on_line]]) * lines.direction[on_line]).sum(axis=1)
+    t_vertex = ((vertices[vertex] - origin[on_line]) * lines.direction[on_line]).sum(axis=1)
 
-    first, second, t_first, t_second, crossings = _find_crossings(
-        vertices[lines.base], lines.direction, lines.reach, touching, tolerance
-    )
+    first, second, t_first, t_second = _find_crossings(origin, lines.direction, lines.reach, touching, tolerance)
+    crossings = origin[first] + t_first[:, None] * lines.direction[first]
     cross_name = len(vertices) + len(ends) + np.arange(len(crossings))
 
     w = len(vertices)
@@ -144,17 +144,38 @@ def _find_incidences(
     return touching
 
 
-@njit(cache=True, nogil=True)
 def _find_crossings(
     origin: Floats, direction: Floats, reach: Floats, touching: NDArray[np.bool_], tolerance: float
-) -> tuple[Ints, Ints, Floats, Floats, Floats]:
-    """Where lines meet that share no environment vertex: both lines, both parameters, the points (x, 2). O(c²)."""
-    capacity = 256
-    first, second = np.empty(capacity, np.int64), np.empty(capacity, np.int64)
-    t_first, t_second, points = np.empty(capacity), np.empty(capacity), np.empty((capacity, 2))
-    n = 0
+) -> tuple[Ints, Ints, Floats, Floats]:
+    """Where lines meet that share no environment vertex: both lines, both parameters, each (x,). O(c²)."""
+    room = 32 * len(origin)
+    while True:
+        lines, parameters = np.empty((room, 2), np.int64), np.empty((room, 2))
+        count = _cross_lines(origin, direction, reach, touching, tolerance, lines, parameters)
+        if count <= room:
+            return lines[:count, 0], lines[:count, 1], parameters[:count, 0], parameters[:count, 1]
+        room = count
+
+
+@njit(cache=True, nogil=True)
+def _cross_lines(
+    origin: Floats,
+    direction: Floats,
+    reach: Floats,
+    touching: NDArray[np.bool_],
+    tolerance: float,
+    lines: Ints,
+    parameters: Floats,
+) -> int:
+    """Write down as many crossings as ``lines`` and ``parameters`` (m, 2) have room for; how many there are."""
+    shared = np.empty(touching.shape[1], np.int64)
+    count = 0
     for i in range(len(origin)):
-        shared = np.flatnonzero(touching[i])
+        on_line = 0
+        for v in range(touching.shape[1]):
+            if touching[i, v]:
+                shared[on_line] = v
+                on_line += 1
         ux, uy = direction[i, 0], direction[i, 1]
         for j in range(i + 1, len(origin)):
             vx, vy = direction[j, 0], direction[j, 1]
@@ -169,19 +190,15 @@ def _find_crossings(
             if t < reach[j, 0] - tolerance or t > reach[j, 1] + tolerance:
                 continue
             meet = False
-            for v in shared:
-                meet = meet or touching[j, v]
+            for k in range(on_line):
+                meet = meet or touching[j, shared[k]]
             if meet:
                 continue
-            if n == capacity:
-                first, second = np.concatenate((first, first)), np.concatenate((second, second))
-                t_first, t_second = np.concatenate((t_first, t_first)), np.concatenate((t_second, t_second))
-                points = np.concatenate((points, points))
-                capacity *= 2
-            first[n], second[n], t_first[n], t_second[n] = i, j, s, t
-            points[n, 0], points[n, 1] = origin[i, 0] + s * ux, origin[i, 1] + s * uy
-            n += 1
-    return first[:n].copy(), second[:n].copy(), t_first[:n].copy(), t_second[:n].copy(), points[:n].copy()
+            if count < len(lines):
+                lines[count, 0], lines[count, 1] = i, j
+                parameters[count, 0], parameters[count, 1] = s, t
+            count += 1
+    return count
 
 
 @njit(cache=True, nogil=True)
@@ -223,7 +240,7 @@ def _walk_faces(tail: Ints, obstacle: NDArray[np.bool_], around: Ints, block: In
     Returns:
         The free face on the left of each side, or `NONE`; vertices of all free faces; where each face starts.
     """
-    follower = np.empty_like(around)
+    follower = np.empty(len(around), np.int64)
     for p in range(len(around)):
         at = tail[around[p]]
         follower[around[p] ^ 1] = around[p - 1] if p > block[at] else around[block[at + 1] - 1]

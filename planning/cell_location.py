@@ -77,9 +77,11 @@ def _fill_buckets(
     bucket_cells = np.empty(0, np.int64)
     for fill in (False, True):
         if fill:
-            bucket_starts[1:] = np.cumsum(bucket_starts[1:])
-            bucket_cells = np.empty(bucket_starts[-1], np.int64)
-            bucket_starts[1:] = bucket_starts[:-1].copy()  # moves on by one for each cell put in
+            entries = 0
+            for bucket in range(columns * rows):
+                # The start of each bucket, one place late: it moves on to the bucket's end as cells are put in.
+                entries, bucket_starts[bucket + 1] = entries + bucket_starts[bucket + 1], entries
+            bucket_cells = np.empty(entries, np.int64)
         for k in range(len(starts) - 1):
             x_min, x_max, y_min, y_max = np.inf, -np.inf, np.inf, -np.inf
             for c in range(starts[k], starts[k + 1]):

@@ -65,25 +65,16 @@ def find_critical_lines(
 
     Complexity: O(r V) for the rays, O(r² V) at worst for the bitangents of r reflex vertices.
     """
-    rays = _shoot_rays(vertices, after, before, reflex, tolerance)
-    rays = _select(rays, _distinct(rays[3]))
-    ray_count = len(rays[0])
-    lines = _join(rays, _find_bitangents(vertices, after, before, reflex, longest_bitangent, tolerance))
-    return CriticalLines(*lines, ray_count=ray_count, bitangent_count=len(lines[0]) - ray_count)
+    rays = _find_rays(vertices, after, before, reflex, tolerance)
+    bitangents = _find_bitangents(vertices, after, before, reflex, longest_bitangent, tolerance)
+    base, direction, reach, end_vertex, end_wall = (
+        np.concatenate(columns) for columns in zip(rays, bitangents, strict=True)
+    )
+    return CriticalLines(base, direction, reach, end_vertex, end_wall, len(rays[0]), len(bitangents[0]))
 
 
 Lines = tuple[Ints, Floats, Floats, Ints, Ints]
 """The arrays of `CriticalLines` in its order."""
-
-
-def _select(lines: Lines, rows: Ints) -> Lines:
-    base, direction, reach, end_vertex, end_wall = lines
-    return base[rows], direction[rows], reach[rows], end_vertex[rows], end_wall[rows]
-
-
-def _join(first: Lines, second: Lines) -> Lines:
-    a, b, c, d, e = (np.concatenate(pair) for pair in zip(first, second, strict=True))
-    return a, b, c, d, e
 
 
 def _distinct(end_vertex: Ints) -> Ints:
@@ -127,25 +118,59 @@ def _shoot(
     return nearest, vertex, wall, along_wall
 
 
+def _find_rays(vertices: Floats, after: Ints, before: Ints, reflex: Ints, tolerance: float) -> Lines:
+    """Both inflection rays of every reflex vertex, outward along its walls; coincident ones once. O(r V)."""
+    base = np.repeat(reflex, 2)
+    span = vertices[base] - vertices[np.stack([before[reflex], after[reflex]], axis=1).ravel()]
+    direction = span / np.hypot(span[:, 0], span[:, 1])[:, None]
+    reach = np.zeros((len(base), 2))
+    end_vertex, end_wall = np.stack([base, base], axis=1), np.full((len(base), 2), NONE)
+    _shoot_rays(vertices, after, before, base, direction, tolerance, reach, end_vertex, end_wall)
+    rows = _distinct(end_vertex)
+    return base[rows], direction[rows], reach[rows], end_vertex[rows], end_wall[rows]
+
+
 @njit(cache=True, nogil=True)
 def _shoot_rays(
-    vertices: Floats, after: Ints, before: Ints, reflex: Ints, tolerance: float
-) -> tuple[Ints, Floats, Floats, Ints, Ints]:
-    """Both inflection rays of every reflex vertex, outward along its walls. O(r V)."""
-    n = 2 * len(reflex)
-    base, direction, reach = np.empty(n, np.int64), np.empty((n, 2)), np.zeros((n, 2))
-    end_vertex, end_wall = np.empty((n, 2), np.int64), np.full((n, 2), NONE)
-    for k in range(n):
-        v = reflex[k // 2]
-        from_vertex = before[v] if k % 2 == 0 else after[v]
-        dx, dy = vertices[v, 0] - vertices[from_vertex, 0], vertices[v, 1] - vertices[from_vertex, 1]
-        length = np.hypot(dx, dy)
-        base[k] = end_vertex[k, 0] = v
-        direction[k, 0], direction[k, 1] = dx / length, dy / length
+    vertices: Floats,
+    after: Ints,
+    before: Ints,
+    base: Ints,
+    direction: Floats,
+    tolerance: float,
+    reach: Floats,
+    end_vertex: Ints,
+    end_wall: Ints,
+) -> None:
+    """Write the far end of each ray into the second columns of ``reach``, ``end_vertex`` and ``end_wall``."""
+    for k in range(len(base)):
         reach[k, 1], end_vertex[k, 1], end_wall[k, 1], _ = _shoot(
-            vertices, after, before, v, dx / length, dy / length, tolerance
+            vertices, after, before, base[k], direction[k, 0], direction[k, 1], tolerance
         )
-    return base, direction, reach, end_vertex, end_wall
+
+
+def _find_bitangents(
+    vertices: Floats, after: Ints, before: Ints, reflex: Ints, longest: float, tolerance: float
+) -> Lines:
+    """True bitangents, each as one line from wall to wall through its two reflex vertices. O(r² V) at worst.
+
+    A pair is left out when a vertex lies on the open segment between them (its two pairs with that vertex draw the
+    same line), and when the line runs into a wall lengthwise (an inflection ray draws it).
+    """
+    room = 8 * len(reflex)
+    while True:
+        pairs, reach = np.empty((room, 2), np.int64), np.empty((room, 2))
+        end_vertex, end_wall = np.empty((room, 2), np.int64), np.empty((room, 2), np.int64)
+        count = _draw_bitangents(
+            vertices, after, before, reflex, longest, tolerance, pairs, reach, end_vertex, end_wall
+        )
+        if count <= room:
+            break
+        room = count
+    base, other = pairs[:count].T
+    span = vertices[other] - vertices[base]
+    direction = span / np.hypot(span[:, 0], span[:, 1])[:, None]
+    return base, direction, reach[:count], end_vertex[:count], end_wall[:count]
 
 
 @njit(cache=True, nogil=True)
@@ -158,7 +183,7 @@ def _is_tangent(vertices: Floats, after: Ints, before: Ints, v: int, ux: float, 
 
 
 @njit(cache=True, nogil=True)
-def _blocker(
+def _blocks(
     vertices: Floats, after: Ints, a: int, v: int, ux: float, uy: float, length: float, tolerance: float
 ) -> bool:
     """Whether wall a meets the open segment of ``length`` from vertex v along the unit vector u."""
@@ -176,18 +201,20 @@ def _blocker(
 
 
 @njit(cache=True, nogil=True)
-def _find_bitangents(
-    vertices: Floats, after: Ints, before: Ints, reflex: Ints, longest: float, tolerance: float
-) -> tuple[Ints, Floats, Floats, Ints, Ints]:
-    """True bitangents, each as one line from wall to wall through its two reflex vertices.
-
-    A pair is left out when a vertex lies on the open segment between them (its two pairs with that vertex draw the
-    same line), and when the line runs into a wall lengthwise (an inflection ray draws it).
-    """
-    capacity = 64
-    base, direction, reach = np.empty(capacity, np.int64), np.empty((capacity, 2)), np.empty((capacity, 2))
-    end_vertex, end_wall = np.empty((capacity, 2), np.int64), np.empty((capacity, 2), np.int64)
-    n = 0
+def _draw_bitangents(
+    vertices: Floats,
+    after: Ints,
+    before: Ints,
+    reflex: Ints,
+    longest: float,
+    tolerance: float,
+    pairs: Ints,
+    reach: Floats,
+    end_vertex: Ints,
+    end_wall: Ints,
+) -> int:
+    """Write down as many bitangents as the (m, 2) arrays have room for; how many there are."""
+    count = 0
     last = 0  # the wall that blocked the pair before: it often blocks the next one too
     for i in range(len(reflex)):
         v = reflex[i]
@@ -202,28 +229,22 @@ def _find_bitangents(
                 continue
             if not _is_tangent(vertices, after, before, w, ux, uy, tolerance):
                 continue
-            blocked = _blocker(vertices, after, last, v, ux, uy, length, tolerance)
-            a = 0
-            while not blocked and a < len(vertices):
-                blocked = _blocker(vertices, after, a, v, ux, uy, length, tolerance)
+            blocked = _blocks(vertices, after, last, v, ux, uy, length, tolerance)
+            for a in range(len(vertices)):
+                if blocked:
+                    break
+                blocked = _blocks(vertices, after, a, v, ux, uy, length, tolerance)
                 last = a if blocked else last
-                a += 1
             if blocked:
                 continue
             back, back_vertex, back_wall, back_along = _shoot(vertices, after, before, v, -ux, -uy, tolerance)
             ahead, ahead_vertex, ahead_wall, ahead_along = _shoot(vertices, after, before, w, ux, uy, tolerance)
             if back_along or ahead_along:
                 continue
-            if n == capacity:
-                base, direction = np.concatenate((base, base)), np.concatenate((direction, direction))
-                reach = np.concatenate((reach, reach))
-                end_vertex = np.concatenate((end_vertex, end_vertex))
-                end_wall = np.concatenate((end_wall, end_wall))
-                capacity *= 2
-            base[n] = v
-            direction[n, 0], direction[n, 1] = ux, uy
-            reach[n, 0], reach[n, 1] = -back, length + ahead
-            end_vertex[n, 0], end_vertex[n, 1] = back_vertex, ahead_vertex
-            end_wall[n, 0], end_wall[n, 1] = back_wall, ahead_wall
-            n += 1
-    return base[:n].copy(), direction[:n].copy(), reach[:n].copy(), end_vertex[:n].copy(), end_wall[:n].copy()
+            if count < len(pairs):
+                pairs[count, 0], pairs[count, 1] = v, w
+                reach[count, 0], reach[count, 1] = -back, length + ahead
+                end_vertex[count, 0], end_vertex[count, 1] = back_vertex, ahead_vertex
+                end_wall[count, 0], end_wall[count, 1] = back_wall, ahead_wall
+            count += 1
+    return count

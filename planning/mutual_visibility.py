@@ -9,6 +9,7 @@ crosses a bridge and no hole lies between the bridges (§4.1.1, steps 2–5). Th
 - A hole between the bridges has such a wall, and that wall has an end between the bridges. So the same walls tell of
   the bridges and of the holes.
 - The wall that hides a cell mostly hides its neighbours too. It is tried first, on the segment of the centroids.
+- Every aspect cell lies in one inflection cell, and inherits what that one sees.
 
 Cells touch walls, and bridges of cells run along walls and through vertices: grazing is seeing. So every cell is first
 shrunk about its centroid by the factor 1 − `SHRINKAGE`; then a bridge meets a wall only if it crosses it. An obstacle
@@ -23,7 +24,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import depth_first_order
 
-from planning.decomposition import Cells, measure_cells
+from planning.decomposition import Cells, decompose, measure_cells
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -64,10 +65,19 @@ def mutual_visibility(cells: Cells) -> csr_array:
     walls = frame.enter(environment.walls.reshape(-1, 2)).reshape(-1, 4)
     # Neighbours after each other: depth first along adjacency.
     order = depth_first_order(cells.adjacency, 0, directed=False, return_predecessors=False).astype(np.int64)
-    seen = _find_visible(shrunk, cells.starts, centroids, order, walls)
+    parent, inherited = _find_parents(cells)
+    seen = _find_visible(shrunk, cells.starts, centroids, order, walls, parent, inherited)
     flat = np.flatnonzero(seen)
     starts = np.concatenate([[0], np.cumsum(np.count_nonzero(seen, axis=1))])
     return csr_array((np.ones(len(flat), np.bool_), flat % n, starts), shape=(n, n))
+
+
+def _find_parents(cells: Cells) -> tuple[Ints, Bools]:
+    """For each cell the inflection cell around it, and which of those see each other; without them, nothing."""
+    if cells.kind == "inflection":
+        return np.zeros(len(cells), np.int64), np.zeros((1, 1), np.bool_)
+    parents = decompose(cells.environment, "inflection")
+    return parents.locate(cells.centroids), mutual_visibility(parents).toarray()
 
 
 @njit(cache=True, nogil=True)
@@ -146,20 +156,22 @@ def _find_obstacle(
         if (start_left and end_left) or (start_right and end_right):
             continue
         if start_left != end_left and _crosses(walls, w, ax, ay, bx, by):
-            return w
+            return int(w)
         if start_right != end_right and _crosses(walls, w, cx, cy, dx, dy):
-            return w
+            return int(w)
         if (
             not (start_left or start_right)
             and _side(cx, cy, ax, ay, x, y) <= 0.0
             and _side(dx, dy, bx, by, x, y) >= 0.0
         ):
-            return w
+            return int(w)
     return -1
 
 
 @njit(cache=True, nogil=True)
-def _find_visible(corners: Floats, starts: Ints, centroids: Floats, order: Ints, walls: Floats) -> Bools:
+def _find_visible(
+    corners: Floats, starts: Ints, centroids: Floats, order: Ints, walls: Floats, parent: Ints, inherited: Bools
+) -> Bools:
     """`mutual_visibility` as a dense (N, N) array; ``order`` puts near cells after each other."""
     n = len(order)
     seen = np.zeros((n, n), np.bool_)
@@ -183,6 +195,9 @@ def _find_visible(corners: Floats, starts: Ints, centroids: Floats, order: Ints,
                 continue
             if _crosses(walls, hides[j], px, py, qx, qy):
                 last = hides[j]
+                continue
+            if inherited[parent[i], parent[j]]:
+                seen[i, j] = seen[j, i] = True
                 continue
             count = 0
             for f in range(faces):
