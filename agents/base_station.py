@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Final, Literal, Protocol
 
 import numpy as np
 from msgspec import structs
-from numpy.typing import NDArray
 
 from agents.mission import Mission
 from agents.records import Connectivity, Decision, LogLine, Planned, Track
@@ -81,6 +80,8 @@ class BaseStation:
         environment: the map as drawn, for the true lines of sight between the places heard.
         planner: decides on deployments.
     """
+
+    hears = frozenset({"state", "intent"})
 
     def __init__(self, mission: Mission, environment: Environment, planner: Planner) -> None:
         self._mission = mission
@@ -240,15 +241,13 @@ class BaseStation:
         for name in (self._agent, *self._robots):
             if name in self._known:
                 places[name] = self._known[name].body.position
-        points = np.array(list(places.values()))
+        points = list(places.values())
         visible = self._environment.visibility_matrix(points)
         component = component_labels(visible)
         agent_heard = self._agent in self._known
         everybody = len(places) == 2 + len(self._robots)
         return Connectivity(
-            links=tuple(
-                (_point(points[i]), _point(points[j])) for i, j in zip(*np.nonzero(np.triu(visible, 1)), strict=True)
-            ),
+            links=tuple((points[i], points[j]) for i, j in np.argwhere(np.triu(visible, 1)).tolist()),
             agent_visible=bool(agent_heard and np.delete(visible[1], 1).any()),
             chain_connected=bool(agent_heard and component[0] == component[1]),
             team_connected=bool(everybody and component.max() == 0),
@@ -268,7 +267,3 @@ def _choice(plan: Plan) -> tuple[object, ...]:
     """What makes a decision: links, and places of relays. Places of spares do not."""
     relays: tuple[Placement, ...] = tuple(placement for placement in plan.placements if not placement.spare)
     return plan.edges, relays
-
-
-def _point(place: NDArray[np.float64]) -> Point:
-    return float(place[0]), float(place[1])

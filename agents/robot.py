@@ -33,6 +33,8 @@ class Robot:
         routes: geodesics of the map inflated by the robot's radius.
     """
 
+    hears = frozenset({"deployment"})
+
     def __init__(self, mission: Mission, name: str, routes: Routes) -> None:
         self._mission = mission
         self._name = name

@@ -100,6 +100,9 @@ Effect: TypeAlias = Publish | Drive | Record | WakeAt | Compute
 class Role(Protocol):
     """A peer's mind. Times are seconds of mission time (``run_time``), which starts at the launcher's epoch."""
 
+    hears: frozenset[str]
+    """Kinds of messages that it listens to; the shell does not even decode the others."""
+
     def start(self, now_s: float, position: Point) -> Sequence[Effect]:
         """First effects; must contain a :class:`WakeAt`."""
 

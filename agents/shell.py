@@ -113,11 +113,11 @@ class PeerShell:
             self.wake_at_s = self._now() + RETRY_S
 
     def _examine(self, publication: Received) -> Heard | Refusal:
-        """The message of a publication, or why it is refused; empty for one's own echo."""
+        """The message of a publication, or why it is refused; empty for what is of no interest, and one's own echo."""
         address = parse(publication.key)
         if address is None or address.team != self._team:
             return "foreign"
-        if not address.operator and address.speaker == self._name:
+        if address.kind not in self._role.hears or (address.speaker == self._name and not address.operator):
             return ""
         if not address.operator and address.speaker not in self._peers:
             return "stranger"

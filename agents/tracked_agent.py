@@ -41,6 +41,8 @@ class TrackedAgent:
         routine: where it goes by itself.
     """
 
+    hears = frozenset({"goal"})
+
     def __init__(self, mission: Mission, free: Environment, routes: Routes, routine: Routine) -> None:
         self._mission = mission
         self._free = free
