@@ -6,13 +6,16 @@ looking at edges that improve nothing, so a row is first tested block by block w
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
-from numba import njit
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from planning.kernel import kernel
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Bools = NDArray[np.bool_]
 
 NO_PREDECESSOR: Final = -1
 """Predecessor of the source itself and of nodes that cannot be reached."""
@@ -26,7 +29,7 @@ class NoPath(ValueError):
     """No path leads from the source to the target."""
 
 
-def all_pairs(W: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+def all_pairs(W: Floats) -> tuple[Floats, Ints]:
     """Distances and predecessors between all pairs of nodes.
 
     O(N³); above about 2000 nodes :func:`from_source` on demand serves better.
@@ -50,9 +53,7 @@ def all_pairs(W: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.i
     return distances, predecessors
 
 
-def from_source(
-    W: NDArray[np.float64], source: int, relays: NDArray[np.bool_] | None = None
-) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+def from_source(W: Floats, source: int, relays: Bools | None = None) -> tuple[Floats, Ints]:
     """Distances and predecessors from one node; O(N² + N log N).
 
     Args:
@@ -76,7 +77,7 @@ def from_source(
     return distances, predecessors
 
 
-def path(predecessors: NDArray[np.int32], source: int, target: int) -> list[int]:
+def path(predecessors: Ints, source: int, target: int) -> list[int]:
     """Nodes from source to target, both included.
 
     Args:
@@ -96,7 +97,7 @@ def path(predecessors: NDArray[np.int32], source: int, target: int) -> list[int]
     return nodes[::-1]
 
 
-def _checked(W: NDArray[np.float64]) -> NDArray[np.float64]:
+def _checked(W: Floats) -> Floats:
     W = np.ascontiguousarray(W, dtype=np.float64)
     if W.ndim != 2 or W.shape[0] != W.shape[1]:
         raise ValueError(f"edge weights form a square matrix, not one of shape {W.shape}")
@@ -106,15 +107,15 @@ def _checked(W: NDArray[np.float64]) -> NDArray[np.float64]:
     return W
 
 
-@njit(cache=True, nogil=True)
-def _settle_all(W, distances, predecessors):  # type: ignore[no-untyped-def]
+@kernel
+def _settle_all(W: Floats, distances: Floats, predecessors: Ints) -> None:
     relays = np.ones(len(W), dtype=np.bool_)
     for source in range(len(W)):
         _settle(W, source, relays, distances[source], predecessors[source])
 
 
-@njit(cache=True, nogil=True)
-def _settle(W, source, relays, distances, predecessors):  # type: ignore[no-untyped-def]
+@kernel
+def _settle(W: Floats, source: int, relays: Bools, distances: Floats, predecessors: Ints) -> None:
     """Dijkstra from one source into one row of distances and one of predecessors.
 
     The heap holds the reached nodes that are not settled; ``places`` says where each one stands in it.
@@ -150,8 +151,8 @@ def _settle(W, source, relays, distances, predecessors):  # type: ignore[no-unty
                     _rise(heap, places, distances, head)
 
 
-@njit(cache=True, nogil=True)
-def _improves(weights, distances, distance):  # type: ignore[no-untyped-def]
+@kernel
+def _improves(weights: Floats, distances: Floats, distance: float) -> bool:
     """Whether any distance falls. Counts without a branch, so that the loop becomes vector instructions."""
     improved = 0
     for place in range(len(weights)):
@@ -159,8 +160,8 @@ def _improves(weights, distances, distance):  # type: ignore[no-untyped-def]
     return improved > 0
 
 
-@njit(cache=True, nogil=True)
-def _sink(heap, places, distances, node, size):  # type: ignore[no-untyped-def]
+@kernel
+def _sink(heap: Ints, places: Ints, distances: Floats, node: int, size: int) -> None:
     """Put the node in at the root of a heap of this size, whose root is free, and let it sink."""
     place = 0
     while True:
@@ -178,8 +179,8 @@ def _sink(heap, places, distances, node, size):  # type: ignore[no-untyped-def]
     places[node] = place
 
 
-@njit(cache=True, nogil=True)
-def _rise(heap, places, distances, node):  # type: ignore[no-untyped-def]
+@kernel
+def _rise(heap: Ints, places: Ints, distances: Floats, node: int) -> None:
     """Let a node rise from its place after its distance fell."""
     place = places[node]
     while place > 0:
