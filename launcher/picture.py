@@ -85,8 +85,7 @@ def draw_plan(
     from matplotlib.collections import LineCollection
 
     figure, axes = _draw_floor(environment, polygons, file, title)
-    for colour, width in ((_FLOOR, 4.5), (_SIGHT, 2.0)):
-        axes.add_collection(LineCollection(list(links), colors=colour, linewidths=width, capstyle="round", zorder=4))
+    axes.add_collection(LineCollection(list(links), colors=_SIGHT, linewidths=2, zorder=4))
     axes.plot([], [], color=_SIGHT, linewidth=2, label="line of sight")
     _draw_peers(axes, [base], "s", _BASE, "base", ["B"])
     _draw_peers(axes, relays, "o", _RELAY, "relay", [str(number) for number in range(1, len(relays) + 1)])
@@ -107,6 +106,7 @@ def _draw_floor(
     from matplotlib.figure import Figure
     from matplotlib.patches import PathPatch, Rectangle
     from matplotlib.path import Path as Outline
+    from matplotlib.ticker import MaxNLocator, MultipleLocator
 
     left, low, right, high = environment.bounds
     margin = 0.02 * max(right - left, high - low)
@@ -129,6 +129,9 @@ def _draw_floor(
     axes.set_xlabel("x [m]", fontsize=8)
     axes.set_ylabel("y [m]", fontsize=8)
     axes.tick_params(labelsize=8, length=3)
+    first, second, *_ = MaxNLocator(9, steps=[1, 2, 5, 10]).tick_values(0, max(width, height))
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MultipleLocator(float(second - first)))
     for spine in axes.spines.values():
         spine.set_visible(False)
     return figure, axes

@@ -5,7 +5,8 @@ things are done to them, in this order, and no more:
 
 - *Specks* go: occupied or unknown cells that hang together, sides or corners, amid free ones, and cover no more than
   `SPECK_AREA_M2` (10 cm by 10 cm), become free. On a grid coarser than 0.1 m a cell nothing is a speck.
-- Where two free cells meet in a corner only, one of them goes (a robot has a radius), so walls never touch themselves.
+- Where two free cells meet in a corner only, one of them goes, so that walls never touch themselves. That can close a
+  passage one cell wide, too narrow for any robot.
 - The outline loses corners, from the inside only: no point of the polygon lies in a cell that is not free, and every
   point that the outline cut off lies within the tolerance of such a cell.
 

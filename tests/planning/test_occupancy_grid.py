@@ -61,6 +61,11 @@ def flood(cells: Booleans, start: tuple[int, int]) -> Booleans:
     return reached
 
 
+def squared(cells: Booleans) -> Booleans:
+    """Lower left cells of the squares of 2 x 2 cells."""
+    return np.asarray(cells[:-1, :-1] & cells[1:, :-1] & cells[:-1, 1:] & cells[1:, 1:])
+
+
 def largest(cells: Booleans) -> Booleans:
     parts = []
     left = cells.copy()
@@ -197,10 +202,12 @@ def test_no_wall_is_cut_and_only_what_is_near_a_wall_is_lost(tmp_path: Path, see
     assert squares(component).covers(space), (seed, tolerance)
     walls = squares(np.pad(~free, 1, constant_values=True))
     near = shapely.affinity.translate(walls, -1, -1).buffer(1.001 * tolerance, quad_segs=32)
-    # A passage one cell wide may be closed where walls meet in a corner: only what a square of 2 x 2 cells can reach.
-    fits = component[:-1, :-1] & component[1:, :-1] & component[:-1, 1:] & component[1:, 1:]
+    # A passage one cell wide may be closed where walls meet in a corner: what 2 x 2 cells can reach has to be there.
+    rows, columns = np.mgrid[: free.shape[0], : free.shape[1]]
+    present = shapely.contains_xy(space, columns + 0.5, rows + 0.5)
+    start = np.argwhere(squared(present))[0]
     reached = np.zeros_like(component)
-    for row, column in np.argwhere(largest(fits)):
+    for row, column in np.argwhere(flood(squared(component), (int(start[0]), int(start[1])))):
         reached[row : row + 2, column : column + 2] = True
     lost = squares(reached).difference(space).difference(near)
     assert lost.area < 1e-6, (seed, tolerance)
