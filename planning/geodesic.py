@@ -213,7 +213,7 @@ def _finish(end: Floats, reached: Floats, corners: Floats, walls: Floats, tolera
         else:
             promised[j] = np.inf
     while True:
-        j = np.argmin(promised)
+        j = int(np.argmin(promised))
         length = promised[j]
         if length == np.inf:
             return length, -1

@@ -99,7 +99,9 @@ def _read_json(path: Path) -> Any:
     except OSError as error:
         raise UnreadableMap(f"{path}: cannot be read ({error.strerror}): check its permissions") from None
     except UnicodeDecodeError:
-        raise UnreadableMap(f"{path}: this is not text: a polygon map is JSON in UTF-8") from None
+        raise UnreadableMap(
+            f"{path}: this is not text: name a .json or .geojson file, or the .yaml of an occupancy grid"
+        ) from None
     except json.JSONDecodeError as error:
         raise UnreadableMap(
             f"{path}: bad JSON at line {error.lineno}, column {error.colno} ({error.msg}): correct it there"

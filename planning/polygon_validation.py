@@ -14,6 +14,7 @@ from planning.line_of_sight import point_is_free
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 RELATIVE_TOLERANCE = 1e-9
 """Two things nearer than this share of the map's diagonal touch."""
@@ -44,7 +45,7 @@ def read_ring(points: ArrayLike, index: int) -> Floats:
         InvalidEnvironment: not a list of [x, y], not finite, or fewer than 3 points.
     """
     try:
-        ring = np.array(points, dtype=np.float64)
+        ring = np.array(points, dtype=np.float64, order="C")
     except (TypeError, ValueError):
         ring = np.empty(0)
     ring_name = name_ring(index)
@@ -73,35 +74,10 @@ def clean_ring(ring: Floats, tolerance: float) -> Floats:
     """The ring (n, 2) without points that repeat their predecessor or lie on the straight line between neighbours.
 
     Both within ``tolerance`` metres; a closing point that repeats the first goes too. The tip of a spike stays, for it
-    does not lie *between* its neighbours. O(n) for few removals.
+    does not lie *between* its neighbours. Empty where fewer than 3 points are left. O(n).
     """
-    kept = list(range(len(ring)))
-    settled = 0
-    i = 0
-    while settled < len(kept) and len(kept) >= 3:
-        i %= len(kept)
-        before, here, after = ring[kept[i - 1]], ring[kept[i]], ring[kept[(i + 1) % len(kept)]]
-        if _is_superfluous(before, here, after, tolerance):
-            del kept[i]
-            i -= 1  # the predecessor has a new neighbour: look at it again
-            settled = max(0, settled - 2)
-        else:
-            i += 1
-            settled += 1
-    return ring[kept] if len(kept) >= 3 else ring[:0]
-
-
-def _is_superfluous(before: Floats, here: Floats, after: Floats, tolerance: float) -> bool:
-    to_here = here - before
-    if math.hypot(*to_here) <= tolerance:
-        return True
-    span = after - before
-    length = math.hypot(*span)
-    if length <= tolerance:
-        return False
-    along = float(to_here @ span) / length
-    across = abs(float(to_here[0] * span[1] - to_here[1] * span[0])) / length
-    return across <= tolerance and 0.0 <= along <= length
+    kept = ring[_find_corners(ring, tolerance)]
+    return kept if len(kept) >= 3 else kept[:0]
 
 
 def signed_area(ring: Floats) -> float:
@@ -166,6 +142,42 @@ def _check_nesting(rings: Sequence[Floats], tolerance: float) -> None:
                     f"hole {index} lies inside hole {other} at {name_place(x, y)}: delete it, or load the space inside "
                     f"hole {other} as a map of its own"
                 )
+
+
+@kernel
+def _find_corners(ring: Floats, tolerance: float) -> Bools:
+    """Which points of a ring (n, 2) `clean_ring` keeps: (n,) bool. Neighbours of what goes are looked at again."""
+    n = ring.shape[0]
+    kept = np.ones(n, np.bool_)
+    before, after = np.arange(-1, n - 1), np.arange(1, n + 1)
+    before[0], after[n - 1] = n - 1, 0
+    i, left, settled = 0, n, 0
+    while settled < left and left >= 3:
+        b, a = before[i], after[i]
+        if _is_superfluous(ring[b, 0], ring[b, 1], ring[i, 0], ring[i, 1], ring[a, 0], ring[a, 1], tolerance):
+            kept[i] = False
+            after[b], before[a] = a, b
+            left -= 1
+            settled = max(0, settled - 2)
+            i = b
+        else:
+            settled += 1
+            i = a
+    return kept
+
+
+@kernel
+def _is_superfluous(bx: float, by: float, x: float, y: float, ax: float, ay: float, tolerance: float) -> bool:
+    """Whether a point repeats the one before it, b, or lies on the segment from there to the one after it, a."""
+    hx, hy = x - bx, y - by
+    if math.hypot(hx, hy) <= tolerance:
+        return True
+    sx, sy = ax - bx, ay - by
+    length = math.hypot(sx, sy)
+    if length <= tolerance:
+        return False
+    along = (hx * sx + hy * sy) / length
+    return abs(hx * sy - hy * sx) <= tolerance * length and 0.0 <= along <= length
 
 
 @kernel

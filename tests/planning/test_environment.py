@@ -62,6 +62,16 @@ def test_arrays_fit_together(seed: int) -> None:
     assert np.array_equal(environment.reflex_vertices, vertices[environment.is_reflex])
 
 
+def test_points_along_walls_vanish_wherever_the_ring_starts() -> None:
+    corners = np.array(SQUARE, dtype=float)
+    sampled = np.concatenate(
+        [np.linspace(a, b, 7, endpoint=False) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
+    )
+    for start in range(len(sampled)):
+        outer = Environment(np.asfortranarray(np.roll(sampled, start, axis=0))).outer
+        assert {tuple(v) for v in outer} == {tuple(v) for v in corners}
+
+
 def test_nothing_can_be_changed() -> None:
     environment = Environment(SQUARE, [PILLAR], "hall")
     with pytest.raises(dataclasses.FrozenInstanceError):
