@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from launcher.commands import live, maps, offline
+from launcher.commands import live, offline, plans
 
 app = typer.Typer(
     name="sightline",
@@ -23,8 +23,8 @@ app.command()(live.demo)
 app.command()(live.run)
 app.command(context_settings=_PLACES)(live.goal)
 app.command()(offline.simulate)
-app.command()(maps.plan)
-app.command(name="map")(maps.show)
+app.command()(plans.plan)
+app.command(name="map")(plans.show)
 app.command()(offline.review)
 
 

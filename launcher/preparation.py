@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import shapely
 
 from agents.leader import DeploymentPlanner
 from agents.mission import Behaviour, Mission, OnDemand, RosterEntry, Scripted, Wandering
+from launcher.ground import Ground, named, text_of
 from launcher.scenario import Scenario, ScenarioFault, find_map, read_scenario
+from planning.deployment import NoChain
 from planning.environment import Environment
-from planning.inflation import NothingLeft
 from planning.warm_up import warm_up
 from protocol.messages import Point
 
@@ -52,85 +52,23 @@ def prepare(file: Path, announce: Callable[[str], None]) -> Preparation:
     map_file = find_map(scenario.map, file.parent, f"{file}: map: ")
     warm_up(announce)
     environment = Environment.load(map_file, containing=scenario.base.position)
-    ground = _Ground(file, environment)
+    ground = Ground(file, environment)
     ground.check_inside("base.position", scenario.base.position)
     agent, robots = scenario.agent, scenario.robots
-    walk = {"agent.start": agent.start} | _named("agent.goals", agent.goals)
+    walk = {"agent.start": agent.start} | named("agent.goals", agent.goals)
     ground.check_walk("agent", walk, agent.radius_m, agent.start, "agent.start")
     if robots.starts:
-        places = _named("robots.starts", robots.starts)
+        places = named("robots.starts", robots.starts)
         ground.check_walk("robots", places, robots.radius_m, scenario.base.position, "base.position")
     starts = robots.starts or _automatic_starts(ground, scenario)
-    ground.check_apart(scenario, starts)
+    robot_discs = [(place, start, robots.radius_m) for place, start in named("robots.starts", starts).items()]
+    ground.check_apart([("agent.start", agent.start, agent.radius_m), *robot_discs])
     mission = _mission(scenario, starts)
     warnings = _check_robots_suffice(file, scenario, mission, environment)
     return Preparation(scenario, environment, mission, warnings)
 
 
-class _Ground:
-    """Places of a scenario on its map."""
-
-    def __init__(self, file: Path, environment: Environment) -> None:
-        self.file = file
-        self.environment = environment
-
-    def check_inside(self, place: str, point: Point, radius_m: float = 0.0) -> None:
-        """Raise unless a disc at this place is inside the free space."""
-        inside = bool(self.environment.contains([point])[0])
-        clearance = shapely.distance(self.environment.polygon.boundary, shapely.Point(point))
-        if inside and clearance >= radius_m:
-            return
-        what = f"{clearance:.2f} m from a wall, nearer than its radius of {radius_m:g} m"
-        if not inside:
-            x0, y0, x1, y1 = self.environment.bounds
-            what = f"inside a wall or off the map (x {x0:g} to {x1:g}, y {y0:g} to {y1:g})"
-        raise ScenarioFault(f"{self.file}: {place} {_text(point)} is {what}; {self._remedy(point, radius_m)}")
-
-    def _remedy(self, point: Point, radius_m: float) -> str:
-        """Name a place near by that would do."""
-        roomy = self.environment.polygon.buffer(-radius_m - 0.05)
-        if roomy.is_empty:
-            return "no place on this map is wide enough: make the radius smaller"
-        near = shapely.get_coordinates(shapely.shortest_line(roomy, shapely.Point(point)))[0]
-        return f"move it, for example to [{near[0]:.2f}, {near[1]:.2f}]"
-
-    def check_walk(self, who: str, places: dict[str, Point], radius_m: float, origin: Point, origin_place: str) -> None:
-        """Raise unless a disc fits at every place and can get there from ``origin``, or from what that sees."""
-        for place, point in places.items():
-            self.check_inside(place, point, radius_m)
-        free = self.room(who, radius_m, origin, origin_place)
-        for place, point in places.items():
-            if not free.contains([point])[0]:
-                raise ScenarioFault(
-                    f"{self.file}: {place} {_text(point)} cannot be reached from {origin_place} {_text(origin)} with a "
-                    f"radius of {radius_m:g} m; move it, or make {who}.radius_m smaller"
-                )
-
-    def room(self, who: str, radius_m: float, origin: Point, origin_place: str) -> Environment:
-        """Where the centre of a disc can be: the part of the free space at ``origin``, or that it sees."""
-        try:
-            return self.environment.inflated(radius_m, containing=origin)
-        except NothingLeft as problem:
-            raise ScenarioFault(
-                f"{self.file}: {who}.radius_m = {radius_m:g} leaves no room at {origin_place} {_text(origin)}; "
-                "make it smaller, or move to where there is more room"
-            ) from problem
-
-    def check_apart(self, scenario: Scenario, starts: tuple[Point, ...]) -> None:
-        """Raise where two discs overlap at the start."""
-        agent, radius = scenario.agent, scenario.robots.radius_m
-        discs = [("agent.start", agent.start, agent.radius_m)]
-        for place, point in _named("robots.starts", starts).items():
-            for other, taken, other_radius in discs:
-                if float(np.hypot(point[0] - taken[0], point[1] - taken[1])) < radius + other_radius:
-                    raise ScenarioFault(
-                        f"{self.file}: {place} {_text(point)} overlaps {other} {_text(taken)}; "
-                        f"keep them {radius + other_radius:g} m apart"
-                    )
-            discs.append((place, point, radius))
-
-
-def _automatic_starts(ground: _Ground, scenario: Scenario) -> tuple[Point, ...]:
+def _automatic_starts(ground: Ground, scenario: Scenario) -> tuple[Point, ...]:
     """Places around the base station, in its sight, nearest first, discs apart from each other and from the agent.
 
     O(g) for a grid of g candidates.
@@ -195,9 +133,33 @@ def _mission(scenario: Scenario, starts: tuple[Point, ...]) -> Mission:
     )
 
 
-def _named(place: str, points: tuple[Point, ...]) -> dict[str, Point]:
-    return {f"{place}[{index}]": point for index, point in enumerate(points)}
-
-
-def _text(point: Point) -> str:
-    return f"[{point[0]:g}, {point[1]:g}]"
+def _check_robots_suffice(
+    file: Path, scenario: Scenario, mission: Mission, environment: Environment
+) -> tuple[str, ...]:
+    """Warnings about far places; raises where the first deployment or a goal needs more robots than there are."""
+    planner = DeploymentPlanner(
+        environment,
+        mission.base_station.start,
+        mission.robot_radius_m,
+        mission.decomposition,
+        base_name=mission.base_station.name,
+        agent_name=mission.tracked_agent.name,
+    )
+    count = scenario.robot_count
+    for place, point in ({"agent.start": scenario.agent.start} | named("agent.goals", scenario.agent.goals)).items():
+        try:
+            needed = planner.relays_needed(point)
+        except NoChain as problem:
+            raise ScenarioFault(
+                f"{file}: {place} {text_of(point)} cannot be joined to base.position by any chain of robots; "
+                "move it, or make robots.radius_m smaller"
+            ) from problem
+        if needed > count:
+            raise ScenarioFault(
+                f"{file}: {place} {text_of(point)} needs {needed} robots between base and agent, and there "
+                f"{'is' if count == 1 else 'are'} {count}; make robots.count at least {needed}, or move it"
+            )
+    most = planner.most_relays_needed()
+    if most <= count:
+        return ()
+    return (f"some places of this map need {most} robots, and there are {count}: in those the chain will be broken",)

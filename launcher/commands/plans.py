@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -110,6 +111,93 @@ def _describe_map(name: str, kind: Literal["inflection", "aspect"], picture: Pat
         out.print(f"  source     {environment.source}", highlight=False, markup=False)
     if picture is not None:
         out.print(f"  picture    {picture}", highlight=False)
+
+
+def plan(
+    name: MapName,
+    base: Annotated[str, typer.Option(metavar="X,Y", help="Where the base station stands, in metres.")],
+    agent: Annotated[list[str], typer.Option(metavar="X,Y", help="Where the agent is, in metres.")],
+    robots: Annotated[int | None, typer.Option(min=0, help="Robots there are; as many as needed if not given.")] = None,
+    radius_m: Annotated[float, typer.Option("--radius", min=0.0, help="Radius of a robot, in metres.")] = 0.2,
+    decomposition: Decomposition = "inflection",
+    picture: Picture = None,
+    as_json: AsJson = False,
+) -> None:
+    """Say where robots are to stand so that lines of sight join the base station to the agent."""
+    with plainly():
+        if len(agent) > 1:
+            raise ScenarioFault(
+                f"--agent was given {len(agent)} times: this version plans chains to one agent, not trees to several; "
+                "give it once"
+            )
+        places = read_point(base, "--base"), read_point(agent[0], "--agent")
+        _plan(name, *places, robots, radius_m, decomposition, picture, as_json)
+
+
+def _plan(
+    name: str,
+    base: Point,
+    agent: Point,
+    robots: int | None,
+    radius_m: float,
+    kind: Literal["inflection", "aspect"],
+    picture: Path | None,
+    as_json: bool,
+) -> None:
+    file = find_map(name, Path())
+    _check_picture(picture)
+    from launcher.ground import Ground
+    from planning.environment import Environment
+    from planning.warm_up import warm_up
+
+    warm_up(_say(as_json))
+    environment = Environment.load(file, containing=base)
+    ground = Ground(file, environment)
+    ground.check_inside("--base", base)
+    ground.check_inside("--agent", agent)
+    ground.room("--radius", radius_m, base, "--base")
+    from agents.leader import DeploymentPlanner
+
+    planner = DeploymentPlanner(environment, base, radius_m, kind)
+    needed = planner.relays_needed(agent)
+    if robots is not None and robots < needed:
+        raise ScenarioFault(
+            f"{file}: the agent at {agent[0]:g},{agent[1]:g} needs {needed} robots, and --robots says {robots}; "
+            f"give at least {needed}, or move the agent"
+        )
+    chain = planner.plan(agent, (), {f"relay{i + 1}": base for i in range(needed)}, None)
+    relays = [placement.position for placement in chain.placements if not placement.spare]
+    stations = [base, *relays, agent]
+    links = list(pairwise(stations))
+    if picture is not None:
+        from launcher.picture import draw_plan
+        from planning.decomposition import decompose
+
+        title = f"{environment.name or file.stem}: {needed} relays"
+        draw_plan(environment, decompose(environment, kind).polygons, base, [agent], relays, links, picture, title)
+    if as_json:
+        print_json(
+            {
+                "map": str(file),
+                "base": base,
+                "agents": [agent],
+                "decomposition": kind,
+                "robot_radius_m": radius_m,
+                "relays_needed": needed,
+                "relays": relays,
+                "links": links,
+                "cost": chain.cost,
+                "spares": None if robots is None else robots - needed,
+                "most_relays_needed": planner.most_relays_needed(),
+            }
+        )
+        return
+    spares = "" if robots is None else f", {robots - needed} to spare"
+    out.print(f"{needed} relays{spares}; virtual cost {chain.cost:.3f}", highlight=False)
+    for title, (x, y) in zip(["base", *(f"relay {i + 1}" for i in range(needed)), "agent"], stations, strict=True):
+        out.print(f"  {title:8}  {x:8.3f}, {y:8.3f}", highlight=False)
+    if picture is not None:
+        out.print(f"Picture: {picture}", highlight=False)
 
 
 def _check_picture(picture: Path | None) -> None:

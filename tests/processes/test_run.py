@@ -1,0 +1,178 @@
+"""``sightline run`` and ``goal`` as a user has them: real processes, one run for most of what there is to check."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+pytestmark = [pytest.mark.processes, pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")]
+
+SIGHTLINE = Path(sys.executable).with_name("sightline")
+PATIENCE_S = 45.0
+"""How long a test waits for what has to come; generous, since nothing is measured by it."""
+
+ROOMS = """{"name": "two rooms", "units": "metres", "holes": [], "outer": [
+    [0, 0], [8, 0], [8, 2.5], [9, 2.5], [9, 0], [17, 0], [17, 6], [9, 6], [9, 3.5], [8, 3.5], [8, 6], [0, 6]]}"""
+SCENARIO = """
+map = "rooms.json"
+duration_s = 300
+[base]
+position = [1.0, 1.0]
+[agent]
+start = [3, 3]
+behaviour = "goals"
+speed_m_s = 1.5
+[robots]
+count = 2
+speed_m_s = 2.0
+"""
+
+
+def processes_of(folder: Path) -> dict[str, int]:
+    """Peers of the run in a folder that have a process, and its id."""
+    found = {}
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            try:
+                command = (entry / "cmdline").read_bytes().split(b"\0")
+                working = (entry / "cwd").readlink()
+            except OSError:
+                continue
+            if b"agents.runtime" in command and working == folder:
+                name = command[command.index(b"agents.runtime") + 2].decode()
+                found[name] = int(entry.name)
+    return found
+
+
+def wait_for(condition: Callable[[], object], what: str, patience_s: float = PATIENCE_S) -> None:
+    deadline = time.monotonic() + patience_s
+    while not condition():
+        assert time.monotonic() < deadline, f"waited {patience_s:g} s for {what}"
+        time.sleep(0.05)
+
+
+@dataclass
+class Run:
+    """A ``sightline run`` in a folder of its own."""
+
+    folder: Path
+    launcher: subprocess.Popen[bytes]
+
+    @property
+    def output(self) -> str:
+        return (self.folder / "output.txt").read_text()
+
+    @property
+    def files(self) -> Path:
+        return self.folder / "runs" / "trial"
+
+    def says(self, text: str) -> None:
+        def said() -> bool:
+            assert self.launcher.poll() is None or text in self.output, self.output
+            return text in self.output
+
+        wait_for(said, f"'{text}' in the output:\n{self.output}")
+
+    def sightline(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [SIGHTLINE, *arguments], cwd=self.folder, capture_output=True, text=True, timeout=PATIENCE_S, check=False
+        )
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Iterator[Callable[[], Run]]:
+    started: list[Run] = []
+
+    def start_run() -> Run:
+        (tmp_path / "rooms.json").write_text(ROOMS)
+        (tmp_path / "trial.toml").write_text(SCENARIO)
+        with (tmp_path / "output.txt").open("wb") as output:
+            launcher = subprocess.Popen(
+                [SIGHTLINE, "run", "trial.toml", "--name", "trial"],
+                cwd=tmp_path,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+            )
+        started.append(Run(tmp_path, launcher))
+        return started[-1]
+
+    yield start_run
+    for run in started:
+        if run.launcher.poll() is None:
+            run.launcher.kill()
+        run.launcher.wait()
+        wait_for(lambda: not processes_of(tmp_path), "all processes to end")
+
+
+def test_a_run_from_start_to_recording(start: Callable[[], Run]) -> None:
+    run = start()
+    run.says("First deployment obeyed")
+    peers = processes_of(run.folder)
+    assert set(peers) == {"base", "agent", "robot1", "robot2"}
+
+    refused = run.sightline("goal", "8.5,5")
+    assert refused.returncode == 2
+    assert refused.stderr.startswith("sightline: the agent refuses 8.5,5")
+    accepted = run.sightline("goal", "14,5", "--run", "runs/trial")
+    assert (accepted.returncode, accepted.stderr) == (0, "")
+    assert "14, 5" in accepted.stdout
+
+    os.kill(peers["robot1"], signal.SIGKILL)
+    run.says("robot1 was killed by SIGKILL; restarting it (1 of 3)")
+    wait_for(lambda: processes_of(run.folder).get("robot1", peers["robot1"]) != peers["robot1"], "robot1 to return")
+    wait_for((run.files / "recordings" / "robot1.1.rrd").is_file, "a recording of the new process")
+    run.says("agent to 14.0, 5.0")
+    time.sleep(3.0)  # the agent walks, and the rest of the team with it
+
+    run.launcher.send_signal(signal.SIGINT)
+    wait_for(lambda: not processes_of(run.folder), "all peers to end", 3.0)
+    assert run.launcher.wait(PATIENCE_S) == 130, run.output
+    assert "share of time" in run.output
+    assert "Traceback" not in run.output
+    for file in ("run.rrd", "mission.json", "scenario.toml", "map.json", "versions.json", "metrics.json"):
+        assert (run.files / file).stat().st_size > 0, file
+    metrics = json.loads((run.files / "metrics.json").read_text())
+    assert metrics["robots"] == 2
+    assert metrics["since_first_deployment"]["agent_visible"] > 0.3
+    assert metrics["agent_distance_m"] > 1.0
+    for log in (run.files / "logs").glob("*.log"):
+        assert "Traceback" not in log.read_text(), log.read_text()
+
+    reviewed = run.sightline("review", "--json")
+    assert reviewed.returncode == 0, reviewed.stderr
+    assert json.loads(reviewed.stdout)["whole_run"] == metrics["whole_run"]
+    nobody = run.sightline("goal", "1,1")
+    assert nobody.returncode == 2
+    assert "does not run" in nobody.stderr
+
+
+def test_a_killed_launcher_leaves_no_process_behind(start: Callable[[], Run]) -> None:
+    run = start()
+    wait_for(lambda: len(processes_of(run.folder)) == 4, "four processes")
+    run.launcher.kill()
+    wait_for(lambda: not processes_of(run.folder), "all peers to end")
+
+
+def test_a_run_that_cannot_be_starts_nothing(start: Callable[[], Run]) -> None:
+    run = start()
+    wait_for(lambda: processes_of(run.folder), "a process")
+    again = run.sightline("run", "trial.toml", "--name", "trial")
+    assert again.returncode == 2
+    assert "runs/trial exists" in again.stderr
+    faulty = run.folder / "faulty.toml"
+    faulty.write_text(SCENARIO.replace("[1.0, 1.0]", "[8.5, 1]"))
+    failed = run.sightline("run", "faulty.toml")
+    assert failed.returncode == 2
+    assert failed.stderr.count("\n") == 1
+    assert "base.position [8.5, 1] is inside a wall" in failed.stderr
+    assert [folder.name for folder in (run.folder / "runs").iterdir() if not folder.is_symlink()] == ["trial"]
