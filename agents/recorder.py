@@ -99,7 +99,7 @@ class RerunRecorder:
         file: written anew, so each incarnation of a process needs a name of its own. Its folder is created.
         team: shown as the recording's name.
         recording_id: the run's; files of the same id merge into one recording.
-        peer: whose process this is; it appears in the file's log lines only.
+        peer: whose process this is; the recording's properties name it with its file.
 
     Raises:
         OSError: the file cannot be created.
@@ -108,7 +108,6 @@ class RerunRecorder:
     def __init__(self, file: Path, *, team: str, recording_id: str, peer: str) -> None:
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_bytes(b"")  # says plainly what is wrong with the place, which rerun does not
-        self._peer = peer
         self._stream = rr.RecordingStream(
             APPLICATION,
             recording_id=recording_id,
@@ -117,6 +116,7 @@ class RerunRecorder:
         rr.set_log_time_enabled(False, recording=self._stream)
         self._stream.set_sinks(rr.FileSink(str(file)))
         self._stream.send_recording_name(team)
+        self._stream.send_property("recorded_by", rr.AnyValues(**{peer: file.name}))
         self._open = True
         self._bounds: tuple[float, float, float, float] | None = None
         self._roles: dict[str, str] = {}

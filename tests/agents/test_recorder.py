@@ -78,6 +78,10 @@ def test_the_recording_brings_its_own_layout_and_one_timeline(file: Path) -> Non
     assert {name for chunk in reader.stream() for name in chunk.timeline_names} == {"run_time"}
 
 
+def test_the_recording_says_which_files_it_was_made_of(file: Path) -> None:
+    assert rows(file, "/__properties/recorded_by", "simulation") == [(None, ["all.rrd"])]
+
+
 def test_bodies_are_drawn_where_they_were(file: Path) -> None:
     drawn = rows(file, "/world/peers/agent/body", "Points2D:positions")
     assert len(drawn) == round(synthetic.DURATION_S / synthetic.PERIOD_S)
