@@ -97,6 +97,8 @@ class BaseStation:
         self._plan: Plan | None = None
         self._said: Deployment | None = None
         self._planning = self._urgent = False
+        self._failure = ""
+        """Of planning; said once, however often it happens."""
         self._effects: list[Effect] = []
 
     def start(self, now_s: float, position: Point) -> Sequence[Effect]:
@@ -177,7 +179,9 @@ class BaseStation:
         """Take a plan over: as a new decision, as an update of the spares' places, or not at all."""
         self._planning = False
         if done.failure:
-            self._log("error", f"planning failed, the last deployment stands: {done.failure}")
+            if done.failure != self._failure:
+                self._log("error", f"planning failed, the last deployment stands: {done.failure}")
+            self._failure = done.failure
             return
         self._effects.append(Record(Planned(planning_s=done.duration_s)))
         plan, before = done.result, self._plan

@@ -81,36 +81,38 @@ class PeerShell:
         self._sequence = 0
         self._heard: dict[tuple[str, str], tuple[int, int]] = {}
         self._operators: dict[tuple[str, str], tuple[int, int]] = {}
-        self._complained: set[tuple[str, Refusal]] = set()
+        self._complained: set[tuple[str, str]] = set()
+        """What has been logged once and is only counted from then on."""
 
     def start(self) -> None:
         """Let the role begin."""
         now_s = self._now()
         self._driver.advance(now_s)
-        self._carry_out(self._role.start(now_s, self._driver.pose()))
+        self._carry_out(self._role.start(now_s, self._driver.pose()), now_s)
 
     def take(self, event: BusEvent) -> None:
         """Pass an event of the bus on to the role, if it is fit for it."""
         if isinstance(event, Received):
             verdict = self._examine(event)
             if isinstance(verdict, Heard):
-                self._tell(verdict)
+                self._tell(verdict, self._now())
             elif verdict:
                 self._refuse(event.key, verdict)
-        elif event.peer != self._name:
-            self._tell(event)
+        elif event.peer in self._peers and event.peer != self._name:
+            self._tell(event, self._now())
 
     def finish(self, done: JobDone) -> None:
         """Pass the end of a computation on to the role."""
-        self._tell(done)
+        self._tell(done, self._now())
 
     def wake(self) -> None:
         """Bring the body up to date and wake the role."""
+        now_s = self._now()
         self.wake_at_s = math.inf
-        self._driver.advance(self._now())
-        self._tell(Woken(self._driver.pose()))
+        self._driver.advance(now_s)
+        self._tell(Woken(self._driver.pose()), now_s)
         if self.wake_at_s == math.inf:
-            self.wake_at_s = self._now() + RETRY_S
+            self.wake_at_s = now_s + RETRY_S
 
     def _examine(self, publication: Received) -> Heard | Refusal:
         """The message of a publication, or why it is refused; empty for what is of no interest, and one's own echo."""
@@ -147,19 +149,20 @@ class PeerShell:
         self.refused[reason] += 1
         address = parse(key)
         speaker = address.speaker if address is not None and address.speaker in self._peers else "others"
-        if reason not in ("foreign", "stale") and (speaker, reason) not in self._complained:
-            self._complained.add((speaker, reason))
-            self._log("warning", f"refused a {reason} message under {key[:200]}; further ones are only counted")
+        if reason not in ("foreign", "stale"):
+            self._complain("warning", (speaker, reason), f"refused a message under {key[:200]}: {reason}")
 
-    def _tell(self, event: Event) -> None:
+    def _tell(self, event: Event, now_s: float) -> None:
         """Give the role an event. Whatever fails on it costs this event and nothing else."""
         try:
-            self._carry_out(self._role.handle(event, self._now()))
+            self._carry_out(self._role.handle(event, now_s), now_s)
         except Exception as problem:
             self.faults += 1
-            self._log("error", f"failed on {_describe(event)}: {type(problem).__name__}: {problem}"[:500])
+            failure = type(problem).__name__
+            kind = event.envelope.kind if isinstance(event, Heard) else type(event).__name__
+            self._complain("error", (kind, failure), f"failed on {_describe(event)}: {failure}: {problem}"[:400])
 
-    def _carry_out(self, effects: Sequence[Effect]) -> None:
+    def _carry_out(self, effects: Sequence[Effect], now_s: float) -> None:
         for effect in effects:
             match effect:
                 case Publish(body):
@@ -175,7 +178,7 @@ class PeerShell:
                 case Drive(velocity, for_s):
                     self._driver.drive(velocity, for_s)
                 case Record(record):
-                    self._record(self._now(), record)
+                    self._record(now_s, record)
                 case WakeAt(time_s):
                     self.wake_at_s = time_s
                 case Compute():
@@ -185,8 +188,10 @@ class PeerShell:
         self._sequence += 1
         self._bus.publish(Address(self._team, self._name, kind_of(envelope.body)).key, encode(envelope))
 
-    def _log(self, level: Literal["warning", "error"], text: str) -> None:
-        self._record(self._now(), LogLine(level=level, text=text))
+    def _complain(self, level: Literal["warning", "error"], what: tuple[str, str], text: str) -> None:
+        if what not in self._complained:
+            self._complained.add(what)
+            self._record(self._now(), LogLine(level=level, text=f"{text}; further ones like this are only counted"))
 
 
 def _describe(event: Event) -> str:

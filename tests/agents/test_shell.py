@@ -194,6 +194,6 @@ def test_carries_out_every_effect(stage: Stage) -> None:
 def test_passes_on_jobs_and_the_coming_and_going_of_others(stage: Stage) -> None:
     done = JobDone("planning", 2, 0.01)
     stage.shell.finish(done)
-    for event in (PeerAppeared("base"), PeerVanished("base"), PeerAppeared("robot1")):
+    for event in (PeerAppeared("base"), PeerVanished("base"), PeerAppeared("robot1"), PeerAppeared("stranger")):
         stage.shell.take(event)
     assert stage.role.events == [done, PeerAppeared("base"), PeerVanished("base")]
