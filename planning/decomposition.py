@@ -127,8 +127,8 @@ def decompose(environment: Environment, kind: Kind = "inflection", max_bitangent
 
     Raises:
         ValueError: an unknown kind, or a ``max_bitangent_m`` that is not positive or comes with ``"inflection"``.
-        DecompositionFailed: the cells do not tile the free space, which takes walls nearer to each other than the
-            tolerance (one thousand-millionth of the map's size).
+        DecompositionFailed: the cells do not tile the free space, which takes walls that cross (an environment that was
+            not validated) or come nearer to each other than its tolerance.
 
     Complexity: O(r² V + c² + I log I), c the number of rays and bitangents; thesis §3.2.2, §4.1.1 and Table 1.
     """
@@ -150,7 +150,7 @@ def decompose(environment: Environment, kind: Kind = "inflection", max_bitangent
     unit_corners = arrangement.points[arrangement.corners]
     areas, centroids = measure_cells(unit_corners, arrangement.starts)
     areas *= frame.size_m**2
-    _check_tiling(environment, frame, arrangement, areas)
+    _check_tiling(environment, frame, unit_corners, arrangement.starts, areas)
     points = frame.leave(arrangement.points)
     points[: len(vertices)] = environment.vertices
     return Cells(
@@ -188,15 +188,21 @@ def _find_adjacency(arrangement: Arrangement) -> csr_array:
     return adjacency
 
 
-def _check_tiling(environment: Environment, frame: Frame, arrangement: Arrangement, areas: Floats) -> None:
-    """Refuse cells that are not a tiling: folded ones (negative area), gaps and overlaps (another total area)."""
-    if abs(areas.sum() - environment.area) <= 1e-9 * environment.area and (areas > 0.0).all():
+def _check_tiling(environment: Environment, frame: Frame, unit_corners: Floats, starts: Ints, areas: Floats) -> None:
+    """Refuse cells that are not a tiling by convex cells: folded or bent ones, gaps, overlaps (another total area)."""
+    after = np.arange(1, len(unit_corners) + 1)
+    after[starts[1:] - 1] = starts[:-1]
+    edge = unit_corners[after] - unit_corners
+    following = edge[after]
+    length = np.hypot(edge[:, 0], edge[:, 1])
+    bend = (edge[:, 0] * following[:, 1] - edge[:, 1] * following[:, 0]) / length
+    tiles = (areas > 0.0).all() and abs(areas.sum() - environment.area) <= 1e-9 * environment.area
+    if tiles and bend.min() >= -4.0 * frame.tolerance:
         return
-    worst = int(areas.argmin())
-    x, y = frame.leave(arrangement.points[arrangement.corners[arrangement.starts[worst]]])
+    x, y = frame.leave(unit_corners[after[bend.argmin()]])
     raise DecompositionFailed(
         f"{environment.name or 'the map'}: its cells do not tile its free space, probably near ({x:.3f}, {y:.3f}) m: "
-        f"walls closer than {environment.tolerance_m:.1e} m cannot be told apart, simplify the map there"
+        f"where walls cross or come closer than {environment.tolerance_m:.1e} m, move them apart or simplify the map"
     )
 
 
