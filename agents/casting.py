@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from planning.geodesic import GeodesicMap
+from typing import TYPE_CHECKING
 
 from agents.base_station import BaseStation
 from agents.behaviour import begin
 from agents.driver import DiscDriver
-from agents.leader import DeploymentPlanner
 from agents.mission import Mission
 from agents.robot import Robot
 from agents.role import Role
 from agents.tracked_agent import TrackedAgent
 from planning.environment import Environment
+from planning.geodesic import GeodesicMap
 from protocol.messages import Point
+
+if TYPE_CHECKING:
+    from agents.leader import DeploymentPlanner
 
 CLEARANCE_M = 1e-3
 """Bodies may come this much nearer to walls than their paths do, so that rounding never stops them on a path."""
@@ -55,6 +58,8 @@ class Casting:
         return role, DiscDriver(entry.start, speed_m_s, room)
 
     def _planner(self) -> DeploymentPlanner:
+        from agents.leader import DeploymentPlanner  # its imports take a quarter of a second, and one peer needs them
+
         mission = self._mission
         return DeploymentPlanner(
             self._environment,
