@@ -5,7 +5,8 @@ second thread and come back as events. A third waits for the signal to end: it a
 lock, so that even a process whose main thread hangs is gone two seconds later. Should the launcher die, the kernel
 sends that signal.
 
-Little is imported before the peer is tied to its launcher; the rest follows in :func:`live`.
+Little is imported before the peer is tied to its launcher; the rest follows in :func:`live`, or has been imported by
+the launcher of which this process is a fork.
 """
 
 from __future__ import annotations
@@ -26,14 +27,17 @@ from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
     from agents.mission import Mission
+    from agents.recorder import Recorder
     from agents.records import AnyRecord
     from agents.role import Compute, JobDone
+    from planning.environment import Environment
     from protocol.inbox import Inbox
 
 CLOSE_WITHIN_S: Final = 2.0
 """From the signal to end until the process is gone, whatever hangs."""
 
 _PR_SET_PDEATHSIG = 1
+_PR_SET_NAME = 15
 
 
 class Ending:
@@ -96,6 +100,15 @@ def tie_to(launcher: int) -> None:
         os._exit(1)
 
 
+def call_oneself(name: str) -> None:
+    """Be called so by ``ps``, ``top`` and ``pgrep``: a fork has its launcher's command line."""
+    ctypes.CDLL(None).prctl(_PR_SET_NAME, name.encode(), 0, 0, 0)
+
+
+def import_all() -> None:
+    """Import what a peer needs, but for what starts threads: forks shall find it there."""
+
+
 def live(mission: Mission, folder: Path, name: str, incarnation: int, ending: Ending) -> None:
     """Be the peer until the end is wished for.
 
@@ -107,7 +120,7 @@ def live(mission: Mission, folder: Path, name: str, incarnation: int, ending: En
         ending: says when it is time.
     """
     from agents.casting import cast
-    from agents.recorder import RerunRecorder
+    from agents.late_recorder import LateRecorder
     from agents.records import LogLine
     from agents.role import JobDone
     from agents.shell import PeerShell
@@ -124,7 +137,7 @@ def live(mission: Mission, folder: Path, name: str, incarnation: int, ending: En
     environment = Environment.load(folder / mission.map_path)
     role, driver = cast(mission, name, environment)
     file = folder / "recordings" / f"{name}.{incarnation}.rrd"
-    recorder = RerunRecorder(file, team=mission.team, recording_id=folder.name, peer=name)
+    recorder = LateRecorder(lambda: _open_recorder(file, mission, folder.name, name, environment))
 
     def record(time_s: float, what: AnyRecord) -> None:
         recorder.record(time_s, name, what)
@@ -180,6 +193,19 @@ def _read_mission(file: Path, name: str, position: str | None) -> Mission:
     return structs.replace(mission, roster=tuple(moved if entry.name == name else entry for entry in mission.roster))
 
 
+def _open_recorder(file: Path, mission: Mission, run: str, name: str, environment: Environment) -> Recorder:
+    """The recorder of a peer; that of the base station draws the map and says how the recording opens."""
+    from agents.recorder import RerunRecorder
+
+    recorder = RerunRecorder(file, team=mission.team, recording_id=run, peer=name)
+    if mission.entry(name).role == "base_station":
+        from planning.decomposition import decompose
+
+        recorder.log_map(environment, decompose(environment, mission.decomposition).polygons)
+        recorder.log_blueprint(mission)
+    return recorder
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Entry of the process."""
     parser = argparse.ArgumentParser(prog="python -m agents.runtime", description="One peer of a mission.")
@@ -192,6 +218,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     ending = Ending()
     if options.launcher is not None:
         tie_to(options.launcher)
+    call_oneself(options.name)
+    print(f"--- {options.name}, incarnation {options.incarnation}, process {os.getpid()}", flush=True)
     status = 0
     try:
         mission = _read_mission(options.mission, options.name, options.position)

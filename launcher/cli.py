@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from typing import Annotated
 
 import typer
+
+# The launcher forks, which is sound with one thread only; numpy's would be idle anyway.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from launcher.commands import live, offline, plans
 

@@ -22,7 +22,6 @@ from launcher.preparation import Preparation, prepare
 from launcher.run_folder import RunFolder
 from launcher.scenario import ScenarioFault
 from launcher.supervisor import Supervisor
-from planning.environment import Environment
 from protocol.inbox import Inbox
 from protocol.zenoh_bus import ZenohBus, free_endpoints
 
@@ -80,7 +79,12 @@ def run(file: Path, name: str | None, duration_s: float | None, console: Console
         highlight=False,
     )
     course = Course(folder)
-    asyncio.run(_accompany(mission, preparation.environment, course, console, begun_s))
+    view = TeamView(mission, preparation.environment)
+    supervisor = Supervisor(
+        mission, folder.path, lambda text: console.print(text, highlight=False, soft_wrap=True), view.position
+    )
+    supervisor.launch()
+    asyncio.run(_accompany(mission, view, supervisor, course, console, begun_s))
     return course
 
 
@@ -104,21 +108,17 @@ def reserve_endpoints(file: Path, preparation: Preparation) -> list[str]:
 
 
 async def _accompany(
-    mission: Mission, environment: Environment, course: Course, console: Console, begun_s: float
+    mission: Mission, view: TeamView, supervisor: Supervisor, course: Course, console: Console, begun_s: float
 ) -> None:
-    """Start the team, watch it until the end, stop it."""
+    """Watch the team until the end, then stop it."""
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         loop.add_signal_handler(number, stop.set)
-    view = TeamView(mission, environment)
-    supervisor = Supervisor(
-        mission, course.folder.path, lambda text: console.print(text, highlight=False, soft_wrap=True), view.position
-    )
     inbox: Inbox[None] = Inbox()
     bus: ZenohBus | None = None
     try:
-        await supervisor.start()
+        supervisor.watch()
         bus = ZenohBus.open(
             mission.team, OBSERVER, None, [entry.endpoint for entry in mission.roster], inbox.put, operator=True
         )

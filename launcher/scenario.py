@@ -52,7 +52,7 @@ class Agent(_Table, frozen=True, kw_only=True):
     """``script``: the ``goals`` in order; ``wander``: it explores; ``goals``: it waits for ``sightline goal``."""
     goals: tuple[Point, ...] = ()
     pause_s: Pause = 2.0
-    start_after_s: Pause = 6.0
+    start_after_s: Pause = 3.0
     around_corner_share: Annotated[float, Meta(ge=0, le=1)] = 0.5
     speed_m_s: Speed = 0.5
     radius_m: Metres = 0.2

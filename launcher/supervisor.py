@@ -1,8 +1,8 @@
-"""One process per peer: started, logged, restarted when it crashes, stopped in time, and never left behind.
+"""One process per peer: started, restarted when it crashes, stopped in time, and never left behind.
 
-Each peer is ``python -m agents.runtime`` in a session of its own, so that Ctrl-C reaches only the launcher, which then
-stops the team in order. A peer asks the kernel to be told when its launcher dies (``PR_SET_PDEATHSIG``), so that a
-killed launcher leaves nobody behind.
+Each peer is in a session of its own, so that Ctrl-C reaches only the launcher, which then stops the team in order. A
+peer asks the kernel to be told when its launcher dies (``PR_SET_PDEATHSIG``), so that a killed launcher leaves nobody
+behind.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from pathlib import Path
 from time import monotonic
 
 from agents.mission import Mission
+from launcher.processes import can_fork, fork_peer, spawn, wait_for_end
 from protocol.messages import Point
 
 RESTARTS = 3
@@ -28,9 +29,6 @@ BACKOFF_S = 0.2
 """Pause before the first restart; it doubles with each crash, and a random share of up to as much is added."""
 TERMINATE_S = 2.0
 """From the request to stop until the processes that still run are killed."""
-_LINE_LIMIT = 1 << 20
-_ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-"""A team has a process per peer already: no thread per core and process on top."""
 
 
 @dataclass
@@ -39,19 +37,15 @@ class Peer:
 
     name: str
     incarnation: int = 0
-    process: asyncio.subprocess.Process | None = None
+    pid: int | None = None
+    """Of its process; None while there is none."""
     crashes: list[float] = field(default_factory=list)
     """When it crashed, monotonic seconds."""
     given_up: bool = False
 
-    @property
-    def running(self) -> bool:
-        """Whether the process exists."""
-        return self.process is not None and self.process.returncode is None
-
 
 class Supervisor:
-    """The processes of a mission. Use it from one asyncio loop, in the main thread (the kernel ties peers to it).
+    """The processes of a mission. Use it from the main thread: the kernel ties peers to the thread that started them.
 
     Args:
         mission: with endpoints.
@@ -70,63 +64,56 @@ class Supervisor:
         self._stopping = asyncio.Event()
         self._watchers: list[asyncio.Task[None]] = []
 
-    async def start(self) -> None:
-        """Start every peer; returns once all processes exist."""
+    def launch(self) -> None:
+        """Start a process for every peer. Best before there is an event loop or any other thread: then it can fork."""
         (self._folder / "logs").mkdir(exist_ok=True)
         (self._folder / "recordings").mkdir(exist_ok=True)
         for peer in self.peers.values():
-            await self._spawn(peer)
-            self._watchers.append(asyncio.create_task(self._watch(peer)))
+            peer.pid = self.start_process(peer)
+
+    def watch(self) -> None:
+        """Restart from now on what crashes. Needs the event loop that :meth:`stop` runs in."""
+        self._watchers = [asyncio.create_task(self._watch(peer)) for peer in self.peers.values()]
 
     async def stop(self) -> None:
         """Ask every process to end, kill what still runs after :data:`TERMINATE_S`, wait until all are gone."""
         self._stopping.set()
         self._signal(signal.SIGTERM)
-        _, late = await asyncio.wait(self._watchers, timeout=TERMINATE_S) if self._watchers else ((), ())
+        _, late = await asyncio.wait(self._watchers, timeout=TERMINATE_S)
         if late:
-            names = ", ".join(peer.name for peer in self.peers.values() if peer.running)
-            if names:
-                self._announce(f"killed, because they did not end within {TERMINATE_S:g} s: {names}")
+            names = ", ".join(peer.name for peer in self.peers.values() if peer.pid is not None)
+            self._announce(f"killed, because they did not end within {TERMINATE_S:g} s: {names}")
             self._signal(signal.SIGKILL)
             await asyncio.wait(late)
 
-    def _signal(self, number: signal.Signals) -> None:
-        for peer in self.peers.values():
-            if peer.process is not None and peer.process.returncode is None:
-                with contextlib.suppress(ProcessLookupError):
-                    peer.process.send_signal(number)
-
-    def command(self, peer: Peer) -> list[str]:
-        """What to execute for a peer's present incarnation."""
+    def start_process(self, peer: Peer) -> int:
+        """Start a process for a peer's present incarnation and return its id."""
         position = self._find(peer.name) if peer.incarnation else None
-        return [
-            sys.executable,
-            "-P",  # whatever the user's own folder holds, `agents` means ours
-            *("-m", "agents.runtime", str(self._folder / "mission.json"), peer.name),
+        arguments = [
+            *(str(self._folder / "mission.json"), peer.name),
             *("--incarnation", str(peer.incarnation), "--launcher", str(os.getpid())),
             *([] if position is None else [f"--position={position[0]},{position[1]}"]),
         ]
+        if can_fork():
+            return fork_peer(arguments, self.log(peer))
+        # With -P, whatever the user's own folder holds, `agents` means ours.
+        return spawn([sys.executable, "-P", "-m", "agents.runtime", *arguments], self.log(peer))
 
-    async def _spawn(self, peer: Peer) -> None:
-        """Start a process for a peer's present incarnation."""
-        peer.process = await asyncio.create_subprocess_exec(
-            *self.command(peer),
-            stdin=asyncio.subprocess.DEVNULL,
-            stdout=asyncio.subprocess.PIPE,
-            stderr=asyncio.subprocess.STDOUT,
-            start_new_session=True,
-            limit=_LINE_LIMIT,
-            env={**os.environ, **_ENVIRONMENT},
-        )
-        if self._stopping.is_set():  # the stop came while the process was being made
-            self._signal(signal.SIGTERM)
+    def log(self, peer: Peer) -> Path:
+        """What the processes of a peer have said."""
+        return self._folder / "logs" / f"{peer.name}.log"
+
+    def _signal(self, number: signal.Signals) -> None:
+        for peer in self.peers.values():
+            if peer.pid is not None:  # not yet waited for, so that the id is still its own
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(peer.pid, number)
 
     async def _watch(self, peer: Peer) -> None:
-        """Log what a peer says and restart it when it crashes, until the team stops or the peer is given up."""
-        while True:
-            assert peer.process is not None
-            await self._log(peer)
-            status = await peer.process.wait()
+        """Restart a peer when it crashes, until the team stops or the peer is given up."""
+        while peer.pid is not None:
+            status = await wait_for_end(peer.pid)
+            peer.pid = None
             if self._stopping.is_set():
                 return
             peer.crashes = [when for when in peer.crashes if monotonic() - when < STEADY_S] + [monotonic()]
@@ -135,7 +122,7 @@ class Supervisor:
                 peer.given_up = True
                 self._announce(
                     f"{peer.name} {how}, the {len(peer.crashes)}th time within {STEADY_S:g} s: given up; "
-                    f"see {self._folder / 'logs' / peer.name}.log"
+                    f"see {self.log(peer)}"
                 )
                 return
             self._announce(f"{peer.name} {how}; restarting it ({len(peer.crashes)} of {RESTARTS})")
@@ -146,20 +133,4 @@ class Supervisor:
             if self._stopping.is_set():
                 return
             peer.incarnation += 1
-            await self._spawn(peer)
-
-    async def _log(self, peer: Peer) -> None:
-        """Append what the process says to its log, each line with name and incarnation, until it closes its output."""
-        assert peer.process is not None
-        assert peer.process.stdout is not None
-        prefix = f"{peer.name}.{peer.incarnation} | "
-        with (self._folder / "logs" / f"{peer.name}.log").open("a", encoding="utf-8") as log:
-            while True:
-                try:
-                    line = await peer.process.stdout.readline()
-                except ValueError:  # a line beyond the limit: asyncio has thrown away what it held of it
-                    line = b"(a line that was too long)\n"
-                if not line:
-                    return
-                log.write(prefix + line.decode(errors="replace").rstrip("\n") + "\n")
-                log.flush()
+            peer.pid = self.start_process(peer)

@@ -1,0 +1,80 @@
+"""Starting a peer's process, by fork or from scratch, and noticing its end. Linux.
+
+A launcher that has checked a scenario has imported everything that a peer needs and has loaded the compiled kernels.
+Its forks have all that at once and share the memory, where processes from scratch would spend a second of a processor
+each. A fork is sound only while the launcher has one thread: it forks before it opens a bus or an event loop.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import sys
+from pathlib import Path
+
+from agents import runtime
+
+_ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+"""A team has a process per peer already: no thread per core and process on top."""
+
+
+def can_fork() -> bool:
+    """Whether this process has one thread only, those of libraries included."""
+    return len(os.listdir("/proc/self/task")) == 1  # noqa: PTH208 (a path object per thread helps nobody)
+
+
+def fork_peer(arguments: list[str], log: Path) -> int:
+    """Process id of a fork of this process that is a peer, in a session of its own; it writes to the log only.
+
+    Args:
+        arguments: those of :func:`agents.runtime.main`.
+        log: appended to.
+    """
+    runtime.import_all()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    pid = os.fork()
+    if pid != 0:
+        return pid
+    try:
+        os.setsid()
+        for path, flags, descriptors in (
+            (os.devnull, os.O_RDONLY, (0,)),
+            (str(log), os.O_WRONLY | os.O_APPEND | os.O_CREAT, (1, 2)),
+        ):
+            opened = os.open(path, flags, 0o644)
+            for descriptor in descriptors:
+                os.dup2(opened, descriptor)
+            os.close(opened)
+        runtime.main(arguments)
+    finally:
+        os._exit(1)  # whatever happens, this is not the launcher any more
+
+
+def spawn(command: list[str], log: Path) -> int:
+    """Process id of a program in a session of its own; it writes to the log only."""
+    return os.posix_spawn(
+        command[0],
+        command,
+        {**os.environ, **_ENVIRONMENT},
+        file_actions=[
+            (os.POSIX_SPAWN_OPEN, 0, os.devnull, os.O_RDONLY, 0),
+            (os.POSIX_SPAWN_OPEN, 1, str(log), os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644),
+            (os.POSIX_SPAWN_DUP2, 1, 2),
+        ],
+        setsid=True,
+    )
+
+
+async def wait_for_end(pid: int) -> int:
+    """Exit status of a child process once it has ended; that of a signal is negative."""
+    loop = asyncio.get_running_loop()
+    ended = asyncio.Event()
+    descriptor = os.pidfd_open(pid)
+    loop.add_reader(descriptor, ended.set)
+    try:
+        await ended.wait()
+    finally:
+        loop.remove_reader(descriptor)
+        os.close(descriptor)
+    return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
