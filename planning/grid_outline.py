@@ -10,8 +10,9 @@ import heapq
 from typing import TypeAlias
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from planning.kernel import kernel
 
 Booleans: TypeAlias = NDArray[np.bool_]
 Integers: TypeAlias = NDArray[np.int64]
@@ -133,7 +134,7 @@ def _simplified(rings: list[Integers], core: Integers, tolerance: float) -> list
     return np.split(alive, starts[1:-1])
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel
 def _cut_corners(
     points: Integers,
     before: Integers,
@@ -151,7 +152,9 @@ def _cut_corners(
     ear criterion: nothing of the outline, and nothing of the core, lies in the triangle. (After M. Visvalingam and
     J. D. Whyatt, 1993, doi:10.1179/000870493786962263, restricted to one side.) Near-linear in practice.
     """
-    heap = [(_doubled_area(points, before[v], v, after[v]), v, before[v], after[v]) for v in np.flatnonzero(alive)]
+    heap = [
+        (_doubled_area(points, before[v], v, after[v]), v, before[v], after[v]) for v in range(len(alive)) if alive[v]
+    ]
     heapq.heapify(heap)
     removed = 0
     while heap:
@@ -169,7 +172,7 @@ def _cut_corners(
     return removed
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel
 def _doubled_area(points: Integers, a: int, v: int, b: int) -> int:
     """Twice the signed area of the triangle of three points by number."""
     (x, y), (over, up), (across, rise) = points[a], points[v], points[b]
@@ -177,7 +180,7 @@ def _doubled_area(points: Integers, a: int, v: int, b: int) -> int:
     return area
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel
 def _occupied(
     points: Integers, a: int, v: int, b: int, alive: Booleans, order: Integers, bucket_starts: Integers, columns: int
 ) -> bool:
@@ -190,7 +193,7 @@ def _occupied(
         first = row * columns + left // _BUCKET
         last = row * columns + right // _BUCKET
         for k in range(bucket_starts[first], bucket_starts[last + 1]):
-            p = order[k]
+            p = int(order[k])
             if points[p, 0] < left or points[p, 0] > right or points[p, 1] < low or points[p, 1] > high:
                 continue
             of_ring = p < len(alive)
