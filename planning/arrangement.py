@@ -21,10 +21,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from planning.critical_lines import NONE, CriticalLines
+from planning.kernel import kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -128,7 +128,7 @@ def _place_points(
     return np.concatenate([vertices, ends, crossings]), (segment, parameter, point)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _find_incidences(
     vertices: Floats, origin: Floats, direction: Floats, reach: Floats, tolerance: float
 ) -> NDArray[np.bool_]:
@@ -157,7 +157,7 @@ def _find_crossings(
         room = count
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _cross_lines(
     origin: Floats,
     direction: Floats,
@@ -201,7 +201,7 @@ def _cross_lines(
     return count
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _merge(points: Floats, order: Ints, tolerance: float) -> Ints:
     """For each point the first of those within ``tolerance`` of it, directly or through others: (n,) int.
 
@@ -227,7 +227,7 @@ def _merge(points: Floats, order: Ints, tolerance: float) -> Ints:
     return parent
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _walk_faces(tail: Ints, obstacle: NDArray[np.bool_], around: Ints, block: Ints) -> tuple[Ints, Ints, Ints]:
     """Walk round every face.
 

@@ -6,8 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from planning.kernel import kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -68,7 +69,7 @@ class CellIndex:
         return found
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _fill_buckets(
     corners: Floats, sides: Floats, starts: Ints, low: Floats, step: Floats, columns: int, rows: int, tolerance: float
 ) -> tuple[Ints, Ints]:
@@ -106,7 +107,7 @@ def _fill_buckets(
     return bucket_starts, bucket_cells
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _locate(
     points: Floats,
     sides: Floats,

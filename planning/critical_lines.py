@@ -16,8 +16,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from planning.kernel import kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -84,7 +85,7 @@ def _distinct(end_vertex: Ints) -> Ints:
     return np.sort(np.unique(key, return_index=True)[1])
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _shoot(
     vertices: Floats, after: Ints, before: Ints, start: int, ux: float, uy: float, tolerance: float
 ) -> tuple[float, int, int, bool]:
@@ -130,7 +131,7 @@ def _find_rays(vertices: Floats, after: Ints, before: Ints, reflex: Ints, tolera
     return base[rows], direction[rows], reach[rows], end_vertex[rows], end_wall[rows]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _shoot_rays(
     vertices: Floats,
     after: Ints,
@@ -173,7 +174,7 @@ def _find_bitangents(
     return base, direction, reach[:count], end_vertex[:count], end_wall[:count]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _is_tangent(vertices: Floats, after: Ints, before: Ints, v: int, ux: float, uy: float, tolerance: float) -> bool:
     """Whether both walls of vertex v lie strictly on one side of the line through it along the unit vector u."""
     x, y = vertices[v, 0], vertices[v, 1]
@@ -182,7 +183,7 @@ def _is_tangent(vertices: Floats, after: Ints, before: Ints, v: int, ux: float, 
     return bool((side_b > tolerance and side_c > tolerance) or (side_b < -tolerance and side_c < -tolerance))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _blocks(
     vertices: Floats, after: Ints, a: int, v: int, ux: float, uy: float, length: float, tolerance: float
 ) -> bool:
@@ -200,7 +201,7 @@ def _blocks(
     return bool(tolerance < t < length - tolerance)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _draw_bitangents(
     vertices: Floats,
     after: Ints,

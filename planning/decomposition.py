@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import Literal, TypeAlias
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
 
@@ -16,6 +15,7 @@ from planning.arrangement import Arrangement, arrange
 from planning.cell_location import CellIndex
 from planning.critical_lines import CriticalLines, find_critical_lines
 from planning.environment import Environment
+from planning.kernel import kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -206,7 +206,7 @@ def _check_tiling(environment: Environment, frame: Frame, unit_corners: Floats, 
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def measure_cells(corners: Floats, starts: Ints) -> tuple[Floats, Floats]:
     """Areas (N,) and centroids (N, 2) of convex polygons given one after the other. O(C).
 

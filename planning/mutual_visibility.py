@@ -19,12 +19,12 @@ that enters the hull by less than this share of a cell's size is not noticed.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import depth_first_order
 
 from planning.decomposition import Cells, decompose, measure_cells
+from planning.kernel import kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -80,7 +80,7 @@ def _find_parents(cells: Cells) -> tuple[Ints, Bools]:
     return parents.locate(cells.centroids), mutual_visibility(parents).toarray()
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _sort_walls(corners: Floats, starts: Ints, walls: Floats) -> tuple[Bools, Bools]:
     """Which cells have a corner strictly in front of which walls, and strictly behind: (N, V) bool each. O(C V)."""
     n = len(starts) - 1
@@ -96,13 +96,13 @@ def _sort_walls(corners: Floats, starts: Ints, walls: Floats) -> tuple[Bools, Bo
     return front, behind
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _side(px: float, py: float, qx: float, qy: float, x: float, y: float) -> float:
     """Positive when (x, y) is left of the line from p to q, negative when right."""
     return (qx - px) * (y - py) - (qy - py) * (x - px)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _crosses(walls: Floats, w: int, px: float, py: float, qx: float, qy: float) -> bool:
     """Whether the segment from p to q goes through wall w from its front."""
     ax, ay, bx, by = walls[w, 0], walls[w, 1], walls[w, 2], walls[w, 3]
@@ -111,7 +111,7 @@ def _crosses(walls: Floats, w: int, px: float, py: float, qx: float, qy: float) 
     return bool((_side(px, py, qx, qy, ax, ay) > 0.0) != (_side(px, py, qx, qy, bx, by) > 0.0))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _find_bridge(corners: Floats, p: int, p_end: int, q: int, q_end: int, side: float) -> tuple[int, int]:
     """Corners of two disjoint convex polygons whose line has no corner of either on the given side.
 
@@ -137,7 +137,7 @@ def _find_bridge(corners: Floats, p: int, p_end: int, q: int, q_end: int, side: 
     return p, q
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _find_obstacle(
     corners: Floats, p: int, p_end: int, q: int, q_end: int, walls: Floats, candidates: Ints, count: int
 ) -> int:
@@ -168,7 +168,7 @@ def _find_obstacle(
     return -1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _find_visible(
     corners: Floats, starts: Ints, centroids: Floats, order: Ints, walls: Floats, parent: Ints, inherited: Bools
 ) -> Bools:
