@@ -41,8 +41,6 @@ class Course:
     folder: RunFolder
     obeyed_after_s: float | None = None
     """From the command to the first moment at which all robots followed a deployment."""
-    ended_s: float = 0.0
-    """Mission time at which the stopping began."""
     interrupted: bool = False
     failure: str = ""
     """Why the run had to end, if it had to."""
@@ -138,7 +136,6 @@ async def _accompany(
                     await asyncio.wait_for(stop.wait(), LOOK_S)
     finally:
         course.interrupted = stop.is_set()
-        course.ended_s = time.time() - mission.epoch_unix_s
         try:
             console.print("Stopping ...")
         finally:  # also when nobody reads what we print any more

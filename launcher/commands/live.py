@@ -77,7 +77,7 @@ def _conclude(course: Course) -> None:
 
     folder = course.folder
     with out.status("Merging the recordings ...") if out.is_terminal else contextlib.nullcontext():
-        metrics = conclude(folder, course.ended_s)
+        metrics = conclude(folder)
     out.print(render(metrics))
     out.print(f"Recording  {folder.recording}", highlight=False)
     out.print(f"Metrics    {folder.metrics_file}", highlight=False)

@@ -43,12 +43,11 @@ def processes_of(folder: Path) -> dict[str, int]:
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit():
             try:
-                command = (entry / "cmdline").read_bytes().split(b"\0")
+                name = (entry / "comm").read_text().strip()
                 working = (entry / "cwd").readlink()
             except OSError:
                 continue
-            if b"agents.runtime" in command and working == folder:
-                name = command[command.index(b"agents.runtime") + 2].decode()
+            if working == folder and name != "sightline":
                 found[name] = int(entry.name)
     return found
 
