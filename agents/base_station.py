@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import TYPE_CHECKING, Final, Literal, Protocol
 
-import numpy as np
 from msgspec import structs
 
 from agents.mission import Mission
@@ -247,12 +247,13 @@ class BaseStation:
                 places[name] = self._known[name].body.position
         points = list(places.values())
         visible = self._environment.visibility_matrix(points)
+        rows = visible.tolist()
         component = component_labels(visible)
         agent_heard = self._agent in self._known
         everybody = len(places) == 2 + len(self._robots)
         return Connectivity(
-            links=tuple((points[i], points[j]) for i, j in np.argwhere(np.triu(visible, 1)).tolist()),
-            agent_visible=bool(agent_heard and np.delete(visible[1], 1).any()),
+            links=tuple((points[i], points[j]) for i, j in combinations(range(len(points)), 2) if rows[i][j]),
+            agent_visible=agent_heard and sum(rows[1]) > 1,  # it is on the diagonal itself
             chain_connected=bool(agent_heard and component[0] == component[1]),
             team_connected=bool(everybody and component.max() == 0),
             lambda2=algebraic_connectivity(visible) if everybody else 0.0,

@@ -93,6 +93,8 @@ class PeerShell:
     def take(self, event: BusEvent) -> None:
         """Pass an event of the bus on to the role, if it is fit for it."""
         if isinstance(event, Received):
+            if event.key.rpartition("/")[2] not in self._role.hears:
+                return  # most of the traffic: not worth a closer look
             verdict = self._examine(event)
             if isinstance(verdict, Heard):
                 self._tell(verdict, self._now())
@@ -115,11 +117,11 @@ class PeerShell:
             self.wake_at_s = now_s + RETRY_S
 
     def _examine(self, publication: Received) -> Heard | Refusal:
-        """The message of a publication, or why it is refused; empty for what is of no interest, and one's own echo."""
+        """The message of a publication, or why it is refused; empty for one's own echo."""
         address = parse(publication.key)
         if address is None or address.team != self._team:
             return "foreign"
-        if address.kind not in self._role.hears or (address.speaker == self._name and not address.operator):
+        if address.speaker == self._name and not address.operator:
             return ""
         if not address.operator and address.speaker not in self._peers:
             return "stranger"

@@ -98,7 +98,7 @@ def test_hears_each_kind_of_each_sender_in_rising_order(stage: Stage) -> None:
     [
         ("other/v1/base/heartbeat", "base", None, "foreign"),
         ("team/v2/base/heartbeat", "base", None, "foreign"),
-        ("team/v1/base/heartbeat/more/and/more", "base", None, "foreign"),
+        ("team/v1/base/more/and/heartbeat", "base", None, "foreign"),
         ("team/v1/agent/heartbeat", "base", None, "impersonated"),
         ("team/v1/intruder/heartbeat", "intruder", None, "stranger"),
         ("team/v1/base/state", "base", None, "misplaced"),
