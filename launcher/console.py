@@ -45,9 +45,14 @@ def plainly() -> Iterator[None]:
         raise typer.Exit(130) from problem
 
 
+def tell(text: str, console: Console = out, style: str = "") -> None:
+    """Say a sentence as it is: no markup in it, and no line breaks that a log or a pipe did not ask for."""
+    console.print(text, style=style, markup=False, highlight=False, soft_wrap=True)
+
+
 def complain(text: str) -> None:
     """Say what is wrong, on stderr, in one line."""
-    err.print(f"sightline: {text}", style="red", markup=False, highlight=False, soft_wrap=True)
+    tell(f"sightline: {text}", err, "red")
 
 
 def print_json(value: Any) -> None:

@@ -17,6 +17,7 @@ from rich.live import Live
 
 from agents.mission import Mission
 from launcher import status as display
+from launcher.console import tell
 from launcher.observer import Status, TeamView
 from launcher.preparation import Preparation, prepare
 from launcher.run_folder import RunFolder
@@ -59,10 +60,10 @@ def run(file: Path, name: str | None, duration_s: float | None, console: Console
     Raises:
         ScenarioFault: the scenario cannot be run; nothing has been started then.
     """
-    console.print(f"Checking {file} ...", highlight=False)
-    preparation = prepare(file, console.print)
+    tell(f"Checking {file} ...", console)
+    preparation = prepare(file, lambda text: tell(text, console))
     for warning in preparation.warnings:
-        console.print(f"Warning: {warning}", style="yellow", highlight=False)
+        tell(f"Warning: {warning}", console, "yellow")
     mission = preparation.mission
     endpoints = reserve_endpoints(file, preparation)
     roster = tuple(structs.replace(entry, endpoint=to) for entry, to in zip(mission.roster, endpoints, strict=True))
@@ -71,17 +72,16 @@ def run(file: Path, name: str | None, duration_s: float | None, console: Console
     )
     folder = RunFolder.create(name, mission.team)
     folder.write(file, mission, preparation.environment)
-    robots = len(mission.robots)
-    console.print(
-        f"Starting {len(roster)} processes (base station, agent, {robots} robots) in {folder.path}; Ctrl-C stops them.",
-        highlight=False,
+    robots = f"{len(mission.robots)} robot" + "s" * (len(mission.robots) != 1)
+    tell(
+        f"Starting {len(roster)} processes (base station, agent, {robots}) for {folder.path}; Ctrl-C stops them.",
+        console,
     )
     course = Course(folder)
     view = TeamView(mission, preparation.environment)
-    supervisor = Supervisor(
-        mission, folder.path, lambda text: console.print(text, highlight=False, soft_wrap=True), view.position
-    )
+    supervisor = Supervisor(mission, folder.path, lambda text: tell(text, console), view.position)
     supervisor.launch()
+    tell("Processes: " + ", ".join(f"{peer.name} {peer.pid}" for peer in supervisor.peers.values()), console)
     asyncio.run(_accompany(mission, view, supervisor, course, console, begun_s))
     return course
 
@@ -137,7 +137,7 @@ async def _accompany(
     finally:
         course.interrupted = stop.is_set()
         try:
-            console.print("Stopping ...")
+            tell("Stopping ...", console)
         finally:  # also when nobody reads what we print any more
             # The bus of the launcher closes beside the stopping, which must not wait for it.
             closing = loop.run_in_executor(None, bus.close) if bus is not None else None
@@ -151,7 +151,7 @@ def _note_obedience(status: Status, mission: Mission, course: Course, console: C
     robots = {entry.name for entry in mission.robots}
     if course.obeyed_after_s is None and all(peer.obeying for peer in status.peers if peer.name in robots):
         course.obeyed_after_s = time.monotonic() - begun_s
-        console.print(f"First deployment obeyed {course.obeyed_after_s:.1f} s after the command.", highlight=False)
+        tell(f"First deployment obeyed {course.obeyed_after_s:.1f} s after the command.", console)
 
 
 def _irreplaceable_loss(supervisor: Supervisor, mission: Mission) -> str:
@@ -175,6 +175,6 @@ def _shown(mission: Mission, console: Console) -> Iterator[Callable[[Status, flo
         nonlocal said
         if now_s >= said[0] + LINE_S or status.chain_connected != said[1]:
             said = (now_s, status.chain_connected)
-            console.print(display.describe(status, now_s), highlight=False, soft_wrap=True)
+            tell(display.describe(status, now_s), console)
 
     yield say

@@ -38,7 +38,7 @@ def draw(status: Status, mission: Mission, now_s: float) -> Table:
     table = Table(
         title=Text(" · ").join([Text(f"{mission.team}  {now_s:.0f}{length}"), chain, sight]),
         title_justify="left",
-        caption=_deployment(status),
+        caption=Text(_deployment(status)),
         caption_justify="left",
         box=None,
         pad_edge=False,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from launcher.console import complain, out, plainly, read_point
+from launcher.console import complain, out, plainly, read_point, tell
 from launcher.scenario import ScenarioFault, find_scenario
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def goal(
         reply = send_goal(RunFolder.find(run).read_mission(), (x, y))
         if not reply.accepted:
             raise ScenarioFault(f"the agent refuses {x:g},{y:g}: {reply.reason}")
-        out.print(f"The agent goes to {x:g}, {y:g}.", highlight=False)
+        tell(f"The agent goes to {x:g}, {y:g}.")
 
 
 def _run(file: Path, name: str | None, duration_s: float | None, begun_s: float) -> None:
@@ -79,6 +79,6 @@ def _conclude(course: Course) -> None:
     with out.status("Merging the recordings ...") if out.is_terminal else contextlib.nullcontext():
         metrics = conclude(folder)
     out.print(render(metrics))
-    out.print(f"Recording  {folder.recording}", highlight=False)
-    out.print(f"Metrics    {folder.metrics_file}", highlight=False)
-    out.print(f"Open it    sightline review {folder.path}", highlight=False)
+    tell(f"Recording  {folder.recording}")
+    tell(f"Metrics    {folder.metrics_file}")
+    tell(f"Open it    sightline review {folder.path}")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from launcher.console import err, out, plainly, print_json
+from launcher.console import err, out, plainly, print_json, tell
 from launcher.scenario import ScenarioFault, find_scenario
 
 if TYPE_CHECKING:
@@ -58,10 +58,10 @@ def review(
         if as_json:
             print_json({"run": str(folder.path), "recording": str(folder.recording), **to_builtins(metrics)})
             return
-        out.print(f"Run {folder.path}", highlight=False)
+        tell(f"Run {folder.path}")
         out.print(render(metrics))
         if show:
-            out.print(open_viewer(folder.recording), highlight=False)
+            tell(open_viewer(folder.recording))
 
 
 def _check_recording(record: Path) -> None:
@@ -80,9 +80,9 @@ def _simulate(file: Path, seeds: int, duration_s: float | None, record: Path | N
     from launcher.simulation import UNTIL_TOLD_S
     from launcher.simulation import simulate as simulate_mission
 
-    preparation = prepare(file, err.print)
+    preparation = prepare(file, lambda text: tell(text, err))
     for warning in preparation.warnings:
-        err.print(f"Warning: {warning}", style="yellow", highlight=False)
+        tell(f"Warning: {warning}", err, "yellow")
     mission, environment = preparation.mission, preparation.environment
     length_s = duration_s or mission.duration_s or UNTIL_TOLD_S
     results: list[tuple[int, Metrics]] = []
@@ -106,12 +106,9 @@ def _simulate(file: Path, seeds: int, duration_s: float | None, record: Path | N
     else:
         out.print(_compare(results))
     speed = seeds * length_s / took_s
-    out.print(
-        f"{seeds * length_s:.0f} s of missions in {took_s:.1f} s: {speed:.0f} times faster than real time",
-        highlight=False,
-    )
+    tell(f"{seeds * length_s:.0f} s of missions in {took_s:.1f} s: {speed:.0f} times faster than real time")
     if record is not None:
-        out.print(f"Recording  {record}", highlight=False)
+        tell(f"Recording  {record}")
 
 
 def _open_recorder(preparation: Preparation, file: Path) -> RerunRecorder:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from launcher.console import out, plainly, print_json, read_point
+from launcher.console import err, out, plainly, print_json, read_point, tell
 from launcher.scenario import ScenarioFault, find_map
 
 if TYPE_CHECKING:
@@ -98,19 +99,17 @@ def _describe_map(name: str, kind: Literal["inflection", "aspect"], picture: Pat
         print_json(facts)
         return
     x0, y0, x1, y1 = environment.bounds
-    out.print(f"{facts['name']}  ({file})", highlight=False)
-    out.print(f"  size       {x1 - x0:.1f} × {y1 - y0:.1f} m, x {x0:g} to {x1:g}, y {y0:g} to {y1:g}", highlight=False)
-    out.print(f"  free       {environment.area:.1f} m²", highlight=False)
-    out.print(
-        f"  walls      {facts['vertices']} vertices, {facts['reflex_vertices']} of them reflex, {facts['holes']} holes",
-        highlight=False,
-    )
-    out.print(f"  cells      {facts['cells']} ({kind})", highlight=False)
-    out.print("  counts     " + ", ".join(f"{key} {value}" for key, value in facts["counts"].items()), highlight=False)
+    tell(f"{facts['name']}  ({file})")
+    tell(f"  size       {x1 - x0:.1f} × {y1 - y0:.1f} m, x {x0:g} to {x1:g}, y {y0:g} to {y1:g}")
+    tell(f"  free       {environment.area:.1f} m²")
+    walls = f"{facts['vertices']} vertices, {facts['reflex_vertices']} of them reflex, {facts['holes']} holes"
+    tell(f"  walls      {walls}")
+    tell(f"  cells      {facts['cells']} ({kind})")
+    tell("  counts     " + ", ".join(f"{key} {value}" for key, value in facts["counts"].items()))
     if environment.source:
-        out.print(f"  source     {environment.source}", highlight=False, markup=False)
+        tell(f"  source     {environment.source}")
     if picture is not None:
-        out.print(f"  picture    {picture}", highlight=False)
+        tell(f"  picture    {picture}")
 
 
 def plan(
@@ -193,11 +192,11 @@ def _plan(
         )
         return
     spares = "" if robots is None else f", {robots - needed} to spare"
-    out.print(f"{needed} relays{spares}; virtual cost {chain.cost:.3f}", highlight=False)
+    tell(f"{needed} relays{spares}; virtual cost {chain.cost:.3f}")
     for title, (x, y) in zip(["base", *(f"relay {i + 1}" for i in range(needed)), "agent"], stations, strict=True):
-        out.print(f"  {title:8}  {x:8.3f}, {y:8.3f}", highlight=False)
+        tell(f"  {title:8}  {x:8.3f}, {y:8.3f}")
     if picture is not None:
-        out.print(f"Picture: {picture}", highlight=False)
+        tell(f"Picture: {picture}")
 
 
 def _check_picture(picture: Path | None) -> None:
@@ -209,8 +208,6 @@ def _check_picture(picture: Path | None) -> None:
         raise ScenarioFault(f"--picture {picture}: there is no folder {picture.parent}; make it, or choose another")
 
 
-def _say(as_json: bool) -> Any:
+def _say(as_json: bool) -> Callable[[str], None]:
     """Where to say what is being done: not into JSON."""
-    from launcher.console import err
-
-    return err.print if as_json else out.print
+    return (lambda text: tell(text, err)) if as_json else tell
