@@ -198,7 +198,7 @@ class BaseStation:
             decision=self._decisions,
             placements=plan.placements,
             edges=plan.edges,
-            cost=plan.cost,
+            cost=plan.cost if math.isfinite(plan.cost) else 0.0,  # JSON has no infinity; no chain has no edges
             relays_needed=plan.relays_needed,
             reason=plan.reason[:500] if decides or self._said is None else self._said.reason,
         )

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
 import pytest
-from agents.leader import Plan
 from msgspec import structs
 
 from agents.base_station import GRACE_S, BaseStation, silence_s
+from agents.leader import Plan
 from agents.mission import Mission
 from agents.records import Connectivity, Decision, Planned, Track
 from agents.role import Compute, Effect, Heard, JobDone
 from planning.environment import Environment
 from protocol.bus import PeerVanished
 from protocol.keys import Address
-from protocol.messages import AnyBody, Deployment, Envelope, Heartbeat, Intent, Placement, Point, State
+from protocol.messages import AnyBody, Deployment, Envelope, Heartbeat, Intent, Placement, Point, State, decode, encode
 from tests.agents.life import Life
 
 START = (1.0, 1.0)
@@ -215,6 +217,13 @@ def test_a_plan_that_does_not_serve_is_said_once(team: Team) -> None:
     team.oracle.answer = plan()
     team.go_on(1.0)
     assert [line.level for line in team.logs] == ["info"] * 3 + ["warning", "info"]
+
+
+def test_a_plan_without_a_chain_can_be_said(team: Team) -> None:
+    team.oracle.answer = replace(plan(edges=(), serves=False), cost=math.inf)
+    team.go_on(0.5)
+    envelope = Envelope(sender="base", incarnation=0, sequence=0, sent_at_s=0.0, body=team.deployments[0][1])
+    assert decode(encode(envelope)) == envelope
 
 
 def test_an_incarnation_that_starts_later_outranks_those_before(mission: Mission, corner: Environment) -> None:
