@@ -3,8 +3,11 @@
 What the settings are for:
 
 - Peers do not relay, and a link found by gossip is never dialled again after a cut. So multicast and gossip are off,
-  every peer dials the whole roster, and goes on dialling for as long as it lives (200 ms, later 1 s apart). Good to
-  about 40 peers.
+  every peer knows the whole roster, and goes on dialling for as long as it lives. Good to about 40 peers.
+- Of two peers only one dials the other. When both do, and one of them is stopped for longer than the lease (a signal, a
+  suspended machine), the other's new link can arrive before the old ones are seen to be gone; zenoh then adds it to
+  what is a new session for the other side only, declares nothing there, and one of the two no longer hears the other,
+  or never sees its token again. Measured: after one in ten of 80 such stops, and after none of 100 with one dialler.
 - A process that ends takes its token with it within milliseconds; one that is stopped or cut off, within the lease of
   1 s (zenoh's own default is 10 s).
 - A peer that vanishes silently can stop the reception of the survivors for 10 s when few threads receive
@@ -76,7 +79,8 @@ class ZenohBus:
             team: the team's name.
             name: of the peer, or of the operator.
             listen: endpoint for others to dial, e.g. ``tcp/127.0.0.1:17447``; None if none shall.
-            connect: endpoints of all others of the team (``listen`` may be among them); none needs to be up.
+            connect: endpoints of the team; none needs to be up. If ``listen`` is among them, they are taken for the
+                roster that all have, and only those after it in alphabetical order are dialled.
             deliver: called from zenoh's threads with all that others say, and with the coming and going of peers.
             operator: join as an operator: hear everything, have no token.
 
@@ -89,9 +93,9 @@ class ZenohBus:
                     f"'{text}' cannot be the name of a {what}: use up to 32 lower-case letters, digits and _, "
                     f"a letter first, and not '{keys.OPERATOR}'"
                 )
-        others = [endpoint for endpoint in connect if endpoint != listen]
-        for endpoint in [*others, *([] if listen is None else [listen])]:
+        for endpoint in [*connect, *([] if listen is None else [listen])]:
             _check_endpoint(endpoint)
+        others = [endpoint for endpoint in connect if listen is None or listen not in connect or endpoint > listen]
         try:
             session = zenoh.open(_configuration(listen, others))
         except zenoh.ZError as problem:
@@ -200,7 +204,7 @@ def _configuration(listen: str | None, others: Sequence[str]) -> Any:
         "connect/endpoints": list(others),
         "connect/timeout_ms": -1,
         "connect/exit_on_failure": False,
-        "connect/retry": {"period_init_ms": 200, "period_max_ms": 1000, "period_increase_factor": 2},
+        "connect/retry": {"period_init_ms": 200, "period_max_ms": 500, "period_increase_factor": 2},
         "open/return_conditions": {"connect_scouted": False, "declares": False},
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
