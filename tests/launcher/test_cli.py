@@ -1,0 +1,151 @@
+"""The command line in one process: answers, JSON, and faults as one sentence with exit status 2."""
+
+from __future__ import annotations
+
+import json
+import math
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+import maps
+from launcher.cli import app
+from planning.environment import Environment
+
+SQUARE = {"type": "Polygon", "coordinates": [[[-5, -5], [5, -5], [5, 5], [-5, 5], [-5, -5]]]}
+SCENARIO = """
+map = "room1"
+duration_s = 8
+seed = 3
+[base]
+position = [5.0, 10.0]
+[agent]
+start = [8.0, 10.0]
+[robots]
+count = 4
+"""
+
+
+def sightline(*arguments: str) -> Result:
+    return CliRunner().invoke(app, list(arguments))
+
+
+def refusal(*arguments: str) -> str:
+    """The one sentence with which a command refuses."""
+    result = sightline(*arguments)
+    assert result.exit_code == 2, (result.output, result.exception)
+    assert result.stderr.startswith("sightline: ")
+    assert result.stderr.count("\n") == 1
+    return result.stderr.strip()
+
+
+@pytest.fixture
+def scenario(tmp_path: Path) -> Path:
+    file = tmp_path / "trial.toml"
+    file.write_text(SCENARIO)
+    return file
+
+
+def test_version() -> None:
+    result = sightline("--version")
+    assert result.exit_code == 0
+    assert result.stdout.startswith("sightline 0.")
+
+
+def test_map_without_a_name_lists_all_maps() -> None:
+    listed = sightline("map")
+    assert listed.exit_code == 0
+    facts = json.loads(sightline("map", "--json").stdout)
+    assert [fact["name"] for fact in facts] == maps.names()
+    for name in maps.names():
+        assert name in listed.stdout
+
+
+def test_map_counts_as_the_decomposition_does(tmp_path: Path) -> None:
+    picture = tmp_path / "room1.png"
+    result = sightline("map", "room1", "--json", "--picture", str(picture))
+    assert result.exit_code == 0, result.output
+    facts = json.loads(result.stdout)
+    assert (facts["counts"]["I"], facts["counts"]["N"]) == (49, 26)
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    aspect = json.loads(sightline("map", "room1", "--decomposition", "aspect", "--json").stdout)
+    assert (aspect["counts"]["I"], aspect["counts"]["N"]) == (207, 200)
+    assert "counts     V 28" in sightline("map", "room1").stdout
+
+
+def test_plan_is_a_chain_of_lines_of_sight(tmp_path: Path) -> None:
+    picture = tmp_path / "plan.svg"
+    arguments = ["plan", "room3", "--base", "10,36", "--agent", "70,10", "--robots", "6", "--picture", str(picture)]
+    result = sightline(*arguments, "--json")
+    assert result.exit_code == 0, result.output
+    plan = json.loads(result.stdout)
+    assert plan["relays_needed"] == len(plan["relays"]) == 6 - plan["spares"]
+    stations = [plan["base"], *plan["relays"], plan["agents"][0]]
+    environment = Environment.load(maps.path("room3"))
+    assert all(environment.line_of_sight(tuple(here), tuple(there)) for here, there in pairwise(stations))
+    assert plan["links"] == [list(link) for link in pairwise(stations)]
+    assert math.isfinite(plan["cost"])
+    assert "<svg" in picture.read_text()
+    assert "relay 1" in sightline(*arguments).stdout
+
+
+def test_plan_takes_negative_places_and_geojson(tmp_path: Path) -> None:
+    file = tmp_path / "square.geojson"
+    file.write_text(json.dumps(SQUARE))
+    result = sightline("plan", str(file), "--base", "-3,-4", "--agent", "-4.5,4")
+    assert result.exit_code == 0, result.output
+    assert result.stdout.startswith("0 relays")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["map", "rom1"], ["no map rom1", "did you mean 'room1'"]),
+        (["map", "room1", "--picture", "room1.bmp"], ["--picture", ".png"]),
+        (["map", "room1", "--picture", "absent/room1.png"], ["--picture", "no folder absent"]),
+        (["plan", "room1", "--base", "5", "--agent", "8,10"], ["--base: '5' is no place", "X,Y"]),
+        (["plan", "room1", "--base", "nan,1", "--agent", "8,10"], ["--base: 'nan,1' is no place"]),
+        (
+            ["plan", "room1", "--base", "0,0", "--agent", "8,10"],
+            ["room1.json: --base [0, 0] is inside a wall", "move it"],
+        ),
+        (["plan", "room1", "--base", "5,10", "--agent", "0,0"], ["--agent [0, 0] is inside a wall", "move it"]),
+        (["plan", "room1", "--base", "5,10", "--agent", "55,15", "--robots", "0"], ["needs", "--robots says 0"]),
+        (["plan", "room1", "--base", "5,10", "--agent", "8,10", "--agent", "9,10"], ["2 times", "give it once"]),
+        (["plan", "room1", "--base", "5,10", "--agent", "8,10", "--radius", "50"], ["--radius", "smaller"]),
+        (["run", "offce"], ["no scenario offce", "did you mean 'office'"]),
+        (["run", "office", "--name", "../up"], ["--name '../up' cannot name a run"]),
+        (["simulate", "absent.toml"], ["no scenario absent.toml", "give a TOML file"]),
+        (["simulate", "room1", "--record", "film.mp4"], ["--record film.mp4", ".rrd"]),
+        (["goal", "-3;4"], ["X,Y: '-3;4' is no place"]),
+        (["goal", "-3,4"], ["there is no run in runs/", "sightline run"]),
+        (["goal", "1,1", "--run", "absent"], ["absent is no run", "mission.json"]),
+        (["review", "absent"], ["absent is no run", "mission.json"]),
+    ],
+)
+def test_a_refusal_is_one_sentence(
+    arguments: list[str], words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    said = refusal(*arguments)
+    for word in words:
+        assert word in said
+    assert not (tmp_path / "runs").exists()
+
+
+def test_simulate_prints_figures_and_json_the_same_twice(scenario: Path, tmp_path: Path) -> None:
+    once, again = (json.loads(sightline("simulate", str(scenario), "--json").stdout) for _ in range(2))
+    assert once["missions"] == again["missions"]
+    assert [mission["seed"] for mission in once["missions"]] == [3]
+    recording = tmp_path / "simulated.rrd"
+    table = sightline("simulate", str(scenario), "--seeds", "2", "--record", str(recording))
+    assert table.exit_code == 0, table.output
+    assert "times faster than real time" in table.stdout
+    assert recording.stat().st_size > 0
+
+
+def test_simulate_refuses_what_cannot_be_run(scenario: Path) -> None:
+    scenario.write_text(SCENARIO.replace("[5.0, 10.0]", "[0.0, 0.0]"))
+    assert f"{scenario}: base.position [0, 0] is inside a wall" in refusal("simulate", str(scenario))
