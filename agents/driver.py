@@ -13,6 +13,11 @@ from planning.environment import Environment
 from protocol.messages import Point
 
 
+def patience_s(control_hz: float) -> float:
+    """How long a body obeys a command that a mind at this rate does not renew."""
+    return max(0.5, 3.0 / control_hz)
+
+
 class RobotDriver(Protocol):
     """A body in the plane."""
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Literal
 
+from agents.driver import patience_s
 from agents.mission import Mission
 from agents.path_follower import STANDING, Leg, PathFollower, Routes, Unreachable
 from agents.records import LogLine, Track
@@ -40,6 +41,7 @@ class Robot:
         self._name = name
         self._leader = mission.base_station.name
         self._follower = PathFollower(routes, mission.robot_speed_m_s)
+        self._patience_s = patience_s(mission.control_hz)
         self._mode: Mode = "waiting"
         self._orders: Deployment | None = None
         self._orders_end_s = 0.0
@@ -80,7 +82,7 @@ class Robot:
         if self._mode == "moving" and self._follower.arrived:
             self._mode = "arrived"
         effects, self._logs = self._logs, []
-        effects.append(Drive(self._leg.velocity, self._leg.lasts_s))
+        effects.append(Drive(self._leg.velocity, min(self._leg.lasts_s, self._patience_s)))
         path = self._follower.remaining(position)
         target = self._follower.target
         if self._control.due(now_s):

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from typing import Final, Literal
 
 from agents.behaviour import Routine
+from agents.driver import patience_s
 from agents.mission import Mission, OnDemand
 from agents.path_follower import STANDING, Leg, PathFollower, Routes, Unreachable
 from agents.records import LogLine, Track
@@ -57,6 +58,7 @@ class TrackedAgent:
         self._on_order = False
         """Whether the present goal is an operator's."""
         self._answers: dict[tuple[str, str], GoalReply] = {}
+        self._patience_s = patience_s(mission.control_hz)
         self._mode: Mode = "waiting"
         self._leg: Leg = STANDING
         self._logs: list[Effect] = []
@@ -105,7 +107,7 @@ class TrackedAgent:
         if self._mode == "moving" and self._follower.arrived:
             self._rest(now_s)
         effects, self._logs = self._logs, []
-        effects.append(Drive(self._leg.velocity, self._leg.lasts_s))
+        effects.append(Drive(self._leg.velocity, min(self._leg.lasts_s, self._patience_s)))
         path, goal = self._follower.remaining(position), self._follower.target
         if self._control.due(now_s):
             effects.append(

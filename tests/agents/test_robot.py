@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from agents.driver import patience_s
 from agents.mission import Mission
 from agents.records import Track
 from agents.robot import Robot
@@ -140,6 +141,13 @@ def test_a_place_that_moves_is_followed_without_a_stop(life: Life) -> None:
     moving = [track.mode for track in tracks(life)[3:]]
     assert len(life.logs) == 1
     assert set(moving) <= {"moving", "arrived"}
+
+
+def test_a_mind_that_hangs_does_not_drive_on(life: Life) -> None:
+    life.hear(order(1, (10.0, 0.0)))
+    life.live_until(1.0)
+    life.driver.advance(9.0)
+    assert life.driver.pose()[0] == pytest.approx(1.0 + patience_s(10.0), abs=0.11)
 
 
 def test_the_loss_of_others_is_not_its_business(life: Life) -> None:
