@@ -101,6 +101,7 @@ def simulate(
     recorder: Recorder | None = None,
     duration_s: float | None = None,
     seed: int | None = None,
+    loss: float = 0.0,
 ) -> MissionTrace:
     """Run a mission in virtual time.
 
@@ -110,12 +111,14 @@ def simulate(
         recorder: is given every record as it is made; the caller closes it.
         duration_s: instead of the mission's; 60 s if neither says.
         seed: instead of the mission's. Equal seeds give equal traces, to the last bit.
+        loss: probability that a peer misses a message.
 
     Returns:
         What the peers recorded.
 
     Raises:
-        ValueError: the map leaves no room for a peer where it starts, or cannot be planned on.
+        ValueError: the map leaves no room for a peer where it starts, or cannot be planned on; or the
+            loss is no probability.
     """
     if seed is not None:
         mission = structs.replace(mission, seed=seed)
@@ -128,7 +131,7 @@ def simulate(
             recorder.record(time_s, peer, what)
 
     time = VirtualTime()
-    network = SimulatedNetwork(time, mission.seed)
+    network = SimulatedNetwork(time, mission.seed, loss=loss)
     casting = Casting(mission, environment)
     peers = [SimulatedPeer(time, network, casting, mission, entry.name, record) for entry in mission.roster]
     # Processes do not beat in step; here the seed says by how much they differ.

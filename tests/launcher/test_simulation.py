@@ -152,6 +152,23 @@ def test_the_seed_decides_and_not_the_hashes_of_python() -> None:
     assert len(digests) == 1
 
 
+@pytest.mark.parametrize("loss", [0.1, 0.3])
+def test_a_chain_stands_though_messages_are_lost(loss: float) -> None:
+    metrics = measure(simulate(around_the_corner(), CORNER, loss=loss), CORNER)
+    assert metrics.errors == 0
+    assert metrics.since_first_deployment is not None
+    assert metrics.since_first_deployment.chain_connected > 0.95
+
+
+def test_robots_that_hear_nothing_stay_where_they_are() -> None:
+    mission = around_the_corner()
+    trace = simulate(mission, CORNER, loss=1.0, duration_s=5.0)
+    assert not trace.decisions
+    for trail, entry in zip(trace.trails, mission.roster, strict=True):
+        if trail.role == "robot":
+            assert (trail.positions == entry.start).all()
+
+
 def test_lasts_as_long_as_it_is_told() -> None:
     mission = structs.replace(around_the_corner(), duration_s=4.0)
     assert simulate(mission, CORNER).duration_s == 4.0
