@@ -135,7 +135,7 @@ def simulate(
     casting = Casting(mission, environment)
     peers = [SimulatedPeer(time, network, casting, mission, entry.name, record) for entry in mission.roster]
     # Processes do not beat in step; here the seed says by how much they differ.
-    phases_s = np.random.default_rng(mission.seed).uniform(0.0, 1.0 / mission.control_hz, len(peers))
+    phases_s = np.random.default_rng([mission.seed, len(peers)]).uniform(0.0, 1.0 / mission.control_hz, len(peers))
     for peer, phase_s in zip(peers, phases_s, strict=True):
         time.call_at(float(phase_s), peer.start)
     time.run_until(ends_s)
