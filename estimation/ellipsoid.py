@@ -150,27 +150,27 @@ class Ellipsoid:
 
     @classmethod
     def from_generators(
-        cls, center: Floats, bounded: Floats, free: Floats, free_scale: float | None = None
+        cls, center: Floats, bounded: Floats, free: Floats, scales: tuple[float, float] | None = None
     ) -> Ellipsoid:
-        """{c + B v + F t : |v| ≤ 1, t any}, every ellipsoid there is.
+        """{c + B v + F t : |v| ≤ 1, t any}: every ellipsoid there is.
 
         Args:
             center: (n,) float, c.
             bounded: (n, r) float, B.
             free: (n, k) float, F.
-            free_scale: the size of the numbers of which F is made; singular values of F in the rounding of it count
-                as 0. The largest singular value if not given.
+            scales: the size of the numbers of which B and F were computed; what is in the rounding of that counts as
+                0. The size of B and F themselves if not given.
         """
         n = len(center)
+        sizes = scales or (float(np.linalg.norm(bounded)), float(np.linalg.norm(free)))
+        rounding = 4 * n * EPSILON * np.array(sizes)
         basis, values, _ = np.linalg.svd(free) if free.shape[1] else (np.eye(n), np.empty(0), None)
-        scale = float(values.max(initial=0.0)) if free_scale is None else free_scale
-        k = int((values > 4 * n * EPSILON * scale).sum())
+        k = int((values > rounding[1]).sum())
         across = basis[:, k:]
         inner, lengths, _ = np.linalg.svd(across.T @ bounded) if k < n else (np.empty((0, 0)), np.empty(0), None)
         semi_axes = np.zeros(n)
         semi_axes[:k] = np.inf
-        flat = 4 * n * EPSILON * lengths.max(initial=0.0)
-        semi_axes[k : k + len(lengths)] = np.where(lengths > flat, lengths, 0.0)
+        semi_axes[k : k + len(lengths)] = np.where(lengths > rounding[0], lengths, 0.0)
         return cls(center, np.hstack([basis[:, :k], across @ inner]), semi_axes)
 
     @classmethod
@@ -249,30 +249,31 @@ class Ellipsoid:
         Args:
             points: (..., n) float.
             tolerance: by which share the ellipsoid is scaled about its centre before asking; a flat semi-axis counts
-                as this share of the longest bounded one.
+                as this share of the numbers it is computed from, the points' and the longest bounded semi-axis.
 
         Returns:
             (...) bool.
         """
-        along = (np.asarray(points, dtype=np.float64) - self.center) @ self.axes
-        known = np.isfinite(self.semi_axes)
-        lengths = self.semi_axes[known]
-        scaled = lengths * (1 + tolerance)
-        scaled[lengths == 0] = tolerance * lengths.max(initial=0.0)
-        inside: NDArray[np.bool_]
-        if (scaled == 0).any():
-            inside = (along[..., known] == 0).all(axis=-1)
-        else:
-            inside = ((along[..., known] / scaled) ** 2).sum(axis=-1) <= 1
+        states = np.asarray(points, dtype=np.float64)
+        along = (states - self.center) @ self.axes
+        wide = np.isfinite(self.semi_axes) & (self.semi_axes > 0)
+        scaled = along[..., wide] / (self.semi_axes[wide] * (1 + tolerance))
+        inside: NDArray[np.bool_] = np.asarray((scaled**2).sum(axis=-1) <= 1)
+        if (self.semi_axes == 0).any():
+            size = self.semi_axes[wide].max(initial=0.0) + np.abs(states).max(axis=-1) + np.abs(self.center).max()
+            inside &= (np.abs(along[..., self.semi_axes == 0]) <= tolerance * size[..., None]).all(axis=-1)
         return inside
 
     def support(self, directions: ArrayLike) -> Floats:
-        """Largest h·x over the set, for h in directions (..., n) float; inf along free directions. Returns (...)."""
+        """Largest h·x over the set, for h in directions (..., n) float. Returns (...) float.
+
+        It is inf unless h is perpendicular to what is free, up to a part of 1e-12.
+        """
         h = np.asarray(directions, dtype=np.float64)
         along = h @ self.axes
         known = np.isfinite(self.semi_axes)
         reach = h @ self.center + np.linalg.norm(along[..., known] * self.semi_axes[known], axis=-1)
-        rounding = 4 * self.dimension * EPSILON * np.linalg.norm(h, axis=-1)
+        rounding = 1e-12 * np.linalg.norm(h, axis=-1)
         return np.asarray(np.where(np.linalg.norm(along[..., ~known], axis=-1) > rounding, np.inf, reach))
 
     def bounding_box(self) -> tuple[Floats, Floats]:
@@ -292,9 +293,10 @@ class Ellipsoid:
         A = _array(matrix, 2, "matrix")
         known = np.isfinite(self.semi_axes)
         moved = A @ self.center + (0.0 if offset is None else np.asarray(offset, dtype=np.float64))
-        scale = float(np.linalg.norm(A, 2)) if A.size else 0.0
+        gain = float(np.linalg.norm(A))
         bounded = A @ (self.axes[:, known] * self.semi_axes[known])
-        return self.from_generators(moved, bounded, A @ self.axes[:, ~known], scale)
+        scales = gain * float(self.semi_axes[known].max(initial=0.0)), gain
+        return self.from_generators(moved, bounded, A @ self.axes[:, ~known], scales)
 
     def preimage(self, matrix: ArrayLike, offset: ArrayLike | None = None) -> Ellipsoid | EmptyIntersection:
         """{x : H x + d in the set}, exactly: thesis §2.1.2 for a measurement of any number of components.

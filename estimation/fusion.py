@@ -2,7 +2,7 @@
 
 For every λ ∈ [0, 1] the points of both sets satisfy λ q₁ + (1 − λ) q₂ ≤ 1, q the quadratics of eq. 4, and this is the
 ellipsoid X = λE₁ + (1 − λ)E₂, E = X / k. λ = 1 is the first set alone, λ = 0 the second. Ros, Sabater and Thomas,
-"An ellipsoidal calculus based on propagation and fusion", doi:10.1109/TSMCB.2002.1018761.
+"An ellipsoidal calculus based on propagation and fusion", IEEE Trans. SMC B 32(4), pp. 430–442, 2002.
 
 *Emptiness.* k(λ) is convex with k(0) = k(1) = 1, and 1 − min k = max over λ of min over x of λ q₁ + (1 − λ) q₂, which
 by the minimax theorem is min over x of max(q₁, q₂). So the two sets have no common point if, and only if, some

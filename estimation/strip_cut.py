@@ -29,8 +29,9 @@ Floats = NDArray[np.float64]
 
 CUT, REDUNDANT, EMPTY = 0, 1, 2
 
-THINNEST = 1e-12
-"""Half-width below which a slab of the unit ball is taken as this thick: it keeps the factor invertible."""
+THINNEST = 1e-9
+"""Half-width below which a slab of the unit ball is taken as this thick: what is flatter than that is lost in rounding
+when it is turned."""
 
 
 @dataclass(frozen=True)
@@ -113,8 +114,9 @@ def cut_factor(
     u = factor.T @ direction
     reach = math.sqrt(np.dot(u, u))
     middle = np.dot(direction, center)
-    # What rounding may have done to h·c: without it, a set far from the origin and thinner than that is cut wrongly.
-    rounding = 4.0 * EPSILON * len(center) * np.dot(np.abs(direction), np.abs(center))
+    # What rounding may have done to h·c and will do to the new centre; a set far from the origin and thinner than
+    # that would be cut wrongly.
+    rounding = 4.0 * EPSILON * len(center) * (np.dot(np.abs(direction), np.abs(center)) + reach)
     low, high = low - rounding, high + rounding
     if reach == 0.0:
         inside = low <= middle <= high
@@ -137,6 +139,7 @@ def cut_factor(
         q = 2.0 * (n - 1.0) * d * d / R
         across = math.sqrt(M * M * q + R / (2.0 * (n - 1.0)) + B)
         along = across * math.sqrt(q)
+    along += rounding / reach
     u = u / reach
     pull = factor @ u
     moved = center + M * (1.0 - q) * pull
