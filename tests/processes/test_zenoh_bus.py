@@ -174,8 +174,9 @@ def test_a_killed_peer_vanishes_and_is_found_again_when_it_is_back(stack: ExitSt
     assert again.wait(PATIENCE_S) == 0
 
 
-def test_a_stopped_peer_vanishes_others_go_on_and_leaving_does_not_wait_for_it(stack: ExitStack) -> None:
-    endpoints = free_endpoints(3)
+@pytest.mark.parametrize("dials", [True, False])
+def test_a_stopped_peer_vanishes_others_go_on_and_leaving_does_not_wait_for_it(stack: ExitStack, dials: bool) -> None:
+    endpoints = sorted(free_endpoints(3), reverse=not dials)
     bus, ear = join(stack, "r0", endpoints, 0)
     stopped = start(stack, "r1", endpoints, 1)
     start(stack, "r2", endpoints, 2)
@@ -199,6 +200,7 @@ def test_a_stopped_peer_vanishes_others_go_on_and_leaving_does_not_wait_for_it(s
     before = len(ear.heard)
     stopped.send_signal(signal.SIGCONT)
     ear.wait_for_change(PeerAppeared("r1"), before)
+    ear.wait_for_voice("r1")
     stopped.send_signal(signal.SIGSTOP)
     bus.publish(f"{TEAM}/v1/r0/state", b"x" * 20_000)
     began_s = time.monotonic()
