@@ -1,10 +1,15 @@
-"""Kernels are compiled before the first test, so that no test's time limit pays for it and none runs a stale one."""
+"""Before the first test: kernels are compiled, so that no test pays for it or runs a stale one; examples are seeded."""
 
 from __future__ import annotations
 
 import pytest
+from hypothesis import settings
 
 from planning.warm_up import warm_up
+
+# The same examples every time; a new one that fails is printed with what is needed to run it again.
+settings.register_profile("sightline", deadline=None, derandomize=True, print_blob=True)
+settings.load_profile("sightline")
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
