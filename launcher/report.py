@@ -229,7 +229,7 @@ def _judge(trace: MissionTrace, sights: Bools) -> Bools:
     base, agent = roles.index("base_station"), roles.index("tracked_agent")
     reached = sights[:, base]
     for _ in roles[2:]:
-        reached = (sights & reached[:, :, None]).any(axis=1)
+        reached = np.any(sights & reached[:, :, None], axis=1)
     visible = np.delete(sights[:, agent], agent, axis=1).any(axis=1)
     return np.column_stack((visible, reached[:, agent], reached.all(axis=1)))
 
