@@ -28,11 +28,13 @@ class Casting:
     Args:
         mission: as all peers know it.
         environment: its map, as drawn.
+        planner: of a casting of the same team on the same map; planners are pure, and large maps take long to prepare.
     """
 
-    def __init__(self, mission: Mission, environment: Environment) -> None:
+    def __init__(self, mission: Mission, environment: Environment, planner: DeploymentPlanner | None = None) -> None:
         self._mission = mission
         self._environment = environment
+        self._known_planner = planner
         self._inflated: list[tuple[float, Environment]] = []
         self._routes: list[tuple[Environment, GeodesicMap]] = []
 
@@ -46,7 +48,7 @@ class Casting:
         mission, entry = self._mission, self._mission.entry(name)
         match entry.role:
             case "base_station":
-                return BaseStation(mission, self._environment, self._planner()), DiscDriver(entry.start, 0.0)
+                return BaseStation(mission, self._environment, self.planner()), DiscDriver(entry.start, 0.0)
             case "tracked_agent":
                 radius_m, speed_m_s = mission.agent_radius_m, mission.agent_speed_m_s
                 free = self._free(radius_m, entry.start)
@@ -57,7 +59,17 @@ class Casting:
         room = self._free(max(radius_m - CLEARANCE_M, 0.0), entry.start)
         return role, DiscDriver(entry.start, speed_m_s, room)
 
-    def _planner(self) -> DeploymentPlanner:
+    def planner(self) -> DeploymentPlanner:
+        """The planner of the team's leader; built when it is first asked for.
+
+        Raises:
+            ValueError: the map cannot be planned on.
+        """
+        if self._known_planner is None:
+            self._known_planner = self._build_planner()
+        return self._known_planner
+
+    def _build_planner(self) -> DeploymentPlanner:
         from agents.leader import DeploymentPlanner  # its imports take a quarter of a second, and one peer needs them
 
         mission = self._mission
@@ -68,6 +80,8 @@ class Casting:
             mission.decomposition,
             base_name=mission.base_station.name,
             agent_name=mission.tracked_agent.name,
+            robot_speed_m_s=mission.robot_speed_m_s,
+            agent_speed_m_s=mission.agent_speed_m_s,
         )
 
     def _free(self, radius_m: float, start: Point) -> Environment:
@@ -88,6 +102,8 @@ class Casting:
         return routes
 
 
-def cast(mission: Mission, name: str, environment: Environment) -> tuple[Role, DiscDriver]:
-    """Role and body of one peer; see :meth:`Casting.cast`."""
-    return Casting(mission, environment).cast(name)
+def cast(
+    mission: Mission, name: str, environment: Environment, planner: DeploymentPlanner | None = None
+) -> tuple[Role, DiscDriver]:
+    """Role and body of one peer; see :class:`Casting`."""
+    return Casting(mission, environment, planner).cast(name)

@@ -26,6 +26,7 @@ from queue import SimpleQueue
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
+    from agents.leader import DeploymentPlanner
     from agents.mission import Mission
     from agents.recorder import Recorder
     from agents.records import AnyRecord
@@ -109,7 +110,9 @@ def import_all() -> None:
     """Import what a peer needs, but for what starts threads: forks shall find it there."""
 
 
-def live(mission: Mission, folder: Path, name: str, incarnation: int, ending: Ending) -> None:
+def live(
+    mission: Mission, folder: Path, name: str, incarnation: int, ending: Ending, planner: DeploymentPlanner | None
+) -> None:
     """Be the peer until the end is wished for.
 
     Args:
@@ -118,6 +121,7 @@ def live(mission: Mission, folder: Path, name: str, incarnation: int, ending: En
         name: of the peer.
         incarnation: how many processes bore the name before.
         ending: says when it is time.
+        planner: of the team, if there is one already.
     """
     from agents.casting import cast
     from agents.late_recorder import LateRecorder
@@ -135,7 +139,7 @@ def live(mission: Mission, folder: Path, name: str, incarnation: int, ending: En
         return time.monotonic() - epoch_monotonic_s
 
     environment = Environment.load(folder / mission.map_path)
-    role, driver = cast(mission, name, environment)
+    role, driver = cast(mission, name, environment, planner)
     file = folder / "recordings" / f"{name}.{incarnation}.rrd"
     recorder = LateRecorder(lambda: _open_recorder(file, mission, folder.name, name, environment))
 
@@ -206,8 +210,13 @@ def _open_recorder(file: Path, mission: Mission, run: str, name: str, environmen
     return recorder
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Entry of the process."""
+def main(arguments: Sequence[str] | None = None, planner: DeploymentPlanner | None = None) -> None:
+    """Entry of the process, which ends in here.
+
+    Args:
+        arguments: of the command line.
+        planner: of the team, which a fork has from its launcher.
+    """
     parser = argparse.ArgumentParser(prog="python -m agents.runtime", description="One peer of a mission.")
     parser.add_argument("mission", type=Path, help="mission.json in the folder of a run")
     parser.add_argument("name", help="of the peer, as on the roster")
@@ -223,7 +232,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     status = 0
     try:
         mission = _read_mission(options.mission, options.name, options.position)
-        live(mission, options.mission.parent, options.name, options.incarnation, ending)
+        live(mission, options.mission.parent, options.name, options.incarnation, ending, planner)
     except Exception:
         traceback.print_exc()
         status = 1

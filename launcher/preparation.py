@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from agents.casting import Casting
 from agents.leader import DeploymentPlanner
 from agents.mission import Behaviour, Mission, OnDemand, RosterEntry, Scripted, Wandering
 from launcher.ground import Ground, named, text_of
@@ -34,6 +35,8 @@ class Preparation:
     environment: Environment
     mission: Mission
     """Without endpoints, and with mission time zero at the epoch of Unix: the launcher fills these in."""
+    planner: DeploymentPlanner
+    """The leader's, since the check needed one and large maps take long to prepare."""
     warnings: tuple[str, ...]
 
 
@@ -64,8 +67,9 @@ def prepare(file: Path, announce: Callable[[str], None]) -> Preparation:
     robot_discs = [(place, start, robots.radius_m) for place, start in named("robots.starts", starts).items()]
     ground.check_apart([("agent.start", agent.start, agent.radius_m), *robot_discs])
     mission = _mission(scenario, starts)
-    warnings = _check_robots_suffice(file, scenario, mission, environment)
-    return Preparation(scenario, environment, mission, warnings)
+    planner = Casting(mission, environment).planner()
+    warnings = _check_robots_suffice(file, scenario, planner)
+    return Preparation(scenario, environment, mission, planner, warnings)
 
 
 def _automatic_starts(ground: Ground, scenario: Scenario) -> tuple[Point, ...]:
@@ -133,18 +137,8 @@ def _mission(scenario: Scenario, starts: tuple[Point, ...]) -> Mission:
     )
 
 
-def _check_robots_suffice(
-    file: Path, scenario: Scenario, mission: Mission, environment: Environment
-) -> tuple[str, ...]:
+def _check_robots_suffice(file: Path, scenario: Scenario, planner: DeploymentPlanner) -> tuple[str, ...]:
     """Warnings about far places; raises where the first deployment or a goal needs more robots than there are."""
-    planner = DeploymentPlanner(
-        environment,
-        mission.base_station.start,
-        mission.robot_radius_m,
-        mission.decomposition,
-        base_name=mission.base_station.name,
-        agent_name=mission.tracked_agent.name,
-    )
     count = scenario.robot_count
     for place, point in ({"agent.start": scenario.agent.start} | named("agent.goals", scenario.agent.goals)).items():
         try:

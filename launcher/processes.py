@@ -13,6 +13,7 @@ import sys
 from pathlib import Path
 
 from agents import runtime
+from agents.leader import DeploymentPlanner
 
 _ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 """A team has a process per peer already: no thread per core and process on top."""
@@ -23,12 +24,13 @@ def can_fork() -> bool:
     return len(os.listdir("/proc/self/task")) == 1  # noqa: PTH208 (a path object per thread helps nobody)
 
 
-def fork_peer(arguments: list[str], log: Path) -> int:
+def fork_peer(arguments: list[str], log: Path, planner: DeploymentPlanner) -> int:
     """Process id of a fork of this process that is a peer, in a session of its own; it writes to the log only.
 
     Args:
         arguments: those of :func:`agents.runtime.main`.
         log: appended to.
+        planner: the team's; the base station's process uses it.
     """
     runtime.import_all()
     sys.stdout.flush()
@@ -46,7 +48,7 @@ def fork_peer(arguments: list[str], log: Path) -> int:
             for descriptor in descriptors:
                 os.dup2(opened, descriptor)
             os.close(opened)
-        runtime.main(arguments)
+        runtime.main(arguments, planner)
     finally:
         os._exit(1)  # whatever happens, this is not the launcher any more
 

@@ -79,7 +79,7 @@ def run(file: Path, name: str | None, duration_s: float | None, console: Console
     )
     course = Course(folder)
     view = TeamView(mission, preparation.environment)
-    supervisor = Supervisor(mission, folder.path, lambda text: tell(text, console), view.position)
+    supervisor = Supervisor(mission, folder.path, preparation.planner, lambda text: tell(text, console), view.position)
     supervisor.launch()
     tell("Processes: " + ", ".join(f"{peer.name} {peer.pid}" for peer in supervisor.peers.values()), console)
     asyncio.run(_accompany(mission, view, supervisor, course, console, begun_s))

@@ -20,6 +20,7 @@ from protocol.bus import BusEvent
 from protocol.simulated_bus import SimulatedNetwork, VirtualTime
 
 if TYPE_CHECKING:
+    from agents.leader import DeploymentPlanner
     from agents.recorder import Recorder
 
 UNTIL_TOLD_S: Final = 60.0
@@ -102,6 +103,7 @@ def simulate(
     duration_s: float | None = None,
     seed: int | None = None,
     loss: float = 0.0,
+    planner: DeploymentPlanner | None = None,
 ) -> MissionTrace:
     """Run a mission in virtual time.
 
@@ -112,6 +114,7 @@ def simulate(
         duration_s: instead of the mission's; 60 s if neither says.
         seed: instead of the mission's. Equal seeds give equal traces, to the last bit.
         loss: probability that a peer misses a message.
+        planner: of a mission that differs in its seed only; saves building another.
 
     Returns:
         What the peers recorded.
@@ -132,7 +135,7 @@ def simulate(
 
     time = VirtualTime()
     network = SimulatedNetwork(time, mission.seed, loss=loss)
-    casting = Casting(mission, environment)
+    casting = Casting(mission, environment, planner)
     peers = [SimulatedPeer(time, network, casting, mission, entry.name, record) for entry in mission.roster]
     # Processes do not beat in step; here the seed says by how much they differ.
     phases_s = np.random.default_rng([mission.seed, len(peers)]).uniform(0.0, 1.0 / mission.control_hz, len(peers))

@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from time import monotonic
 
+from agents.leader import DeploymentPlanner
 from agents.mission import Mission
 from launcher.processes import can_fork, fork_peer, spawn, wait_for_end
 from protocol.messages import Point
@@ -50,15 +51,22 @@ class Supervisor:
     Args:
         mission: with endpoints.
         folder: of the run; holds ``mission.json``.
+        planner: the team's, for forks.
         announce: is told in a sentence what becomes of peers.
         find: where the body of a peer was last heard of; a mind that is restarted finds its body there.
     """
 
     def __init__(
-        self, mission: Mission, folder: Path, announce: Callable[[str], None], find: Callable[[str], Point | None]
+        self,
+        mission: Mission,
+        folder: Path,
+        planner: DeploymentPlanner,
+        announce: Callable[[str], None],
+        find: Callable[[str], Point | None],
     ) -> None:
         self.peers = {entry.name: Peer(entry.name) for entry in mission.roster}
         self._folder = folder
+        self._planner = planner
         self._announce = announce
         self._find = find
         self._stopping = asyncio.Event()
@@ -95,7 +103,7 @@ class Supervisor:
             *([] if position is None else [f"--position={position[0]},{position[1]}"]),
         ]
         if can_fork():
-            return fork_peer(arguments, self.log(peer))
+            return fork_peer(arguments, self.log(peer), self._planner)
         # With -P, whatever the user's own folder holds, `agents` means ours.
         return spawn([sys.executable, "-P", "-m", "agents.runtime", *arguments], self.log(peer))
 

@@ -91,7 +91,9 @@ def _simulate(file: Path, seeds: int, duration_s: float | None, record: Path | N
         for seed in progress.track(range(mission.seed, mission.seed + seeds), description="Simulating ..."):
             recorder = _open_recorder(preparation, record) if record is not None and not results else None
             try:
-                trace = simulate_mission(mission, environment, recorder=recorder, duration_s=length_s, seed=seed)
+                trace = simulate_mission(
+                    mission, environment, recorder=recorder, duration_s=length_s, seed=seed, planner=preparation.planner
+                )
             finally:
                 if recorder is not None:
                     recorder.close()

@@ -11,13 +11,16 @@ from pathlib import Path
 
 import pytest
 
+from agents.leader import DeploymentPlanner
 from agents.mission import Mission
 from launcher import supervisor as supervision
 from launcher.processes import spawn
 from launcher.supervisor import Peer, Supervisor
+from planning.environment import Environment
 
 pytestmark = pytest.mark.processes
 
+ROOM = Environment([(0, 0), (4, 0), (4, 4), (0, 4)])
 SLEEPS = "import time; print('up', flush=True); time.sleep(60)"
 STUBBORN = "import signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN); print('up', flush=True); time.sleep(60)"
 
@@ -36,7 +39,8 @@ class Rehearsal(Supervisor):
 def rehearse(mission: Mission, tmp_path: Path) -> Callable[[dict[str, str]], tuple[Rehearsal, list[str]]]:
     def make(scripts: dict[str, str]) -> tuple[Rehearsal, list[str]]:
         said: list[str] = []
-        team = Rehearsal(mission, tmp_path, said.append, lambda _: (1.5, -2.5))
+        planner = DeploymentPlanner(ROOM, (1.0, 1.0), 0.2, "inflection")
+        team = Rehearsal(mission, tmp_path, planner, said.append, lambda _: (1.5, -2.5))
         team.scripts = scripts
         return team, said
 
