@@ -174,6 +174,14 @@ def test_free_directions() -> None:
     assert cut(slab, Strip([1, 0, 0], 1.5, np.inf)).outcome == "empty"  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("angle", [10.0**-k for k in range(2, 12)])
+def test_a_strip_almost_along_the_free_direction_loses_nothing(angle: float) -> None:
+    slab = Ellipsoid.strip([1, 0], 0.0, 1e-6)
+    result = cut(slab, Strip([1, angle], 5.0, 6.0))  # type: ignore[arg-type]
+    assert result.ellipsoid is not None
+    assert result.ellipsoid.contains([[0.0, 5.0 / angle], [0.0, 6.0 / angle]], 1e-3).all()
+
+
 def test_flat_sets_stay_flat() -> None:
     disc = Ellipsoid.from_factor([0, 0, 1.0], [[1.0, 0], [0, 1.0], [0, 0]])
     result = cut(disc, Strip([1, 0, 5], 5.0, 6.0))  # type: ignore[arg-type]
