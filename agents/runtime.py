@@ -21,6 +21,7 @@ import threading
 import time
 import traceback
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Final
@@ -28,7 +29,7 @@ from typing import TYPE_CHECKING, Final
 if TYPE_CHECKING:
     from agents.leader import DeploymentPlanner
     from agents.mission import Mission
-    from agents.recorder import Recorder
+    from agents.recorder import RerunRecorder
     from agents.records import AnyRecord
     from agents.role import Compute, JobDone
     from planning.environment import Environment
@@ -107,7 +108,9 @@ def call_oneself(name: str) -> None:
 
 
 def import_all() -> None:
-    """Import what a peer needs, but for what starts threads: forks shall find it there."""
+    """Import what a peer needs, so that forks find it there. The recorder alone takes half a second."""
+    for module in ("agents.casting", "agents.recorder", "agents.shell", "protocol.inbox", "protocol.zenoh_bus"):
+        import_module(module)
 
 
 def live(
@@ -124,7 +127,6 @@ def live(
         planner: of the team, if there is one already.
     """
     from agents.casting import cast
-    from agents.late_recorder import LateRecorder
     from agents.records import LogLine
     from agents.role import JobDone
     from agents.shell import PeerShell
@@ -141,7 +143,7 @@ def live(
     environment = Environment.load(folder / mission.map_path)
     role, driver = cast(mission, name, environment, planner)
     file = folder / "recordings" / f"{name}.{incarnation}.rrd"
-    recorder = LateRecorder(lambda: _open_recorder(file, mission, folder.name, name, environment))
+    recorder = _open_recorder(file, mission, folder.name, name, environment)
 
     def record(time_s: float, what: AnyRecord) -> None:
         recorder.record(time_s, name, what)
@@ -197,7 +199,7 @@ def _read_mission(file: Path, name: str, position: str | None) -> Mission:
     return structs.replace(mission, roster=tuple(moved if entry.name == name else entry for entry in mission.roster))
 
 
-def _open_recorder(file: Path, mission: Mission, run: str, name: str, environment: Environment) -> Recorder:
+def _open_recorder(file: Path, mission: Mission, run: str, name: str, environment: Environment) -> RerunRecorder:
     """The recorder of a peer; that of the base station draws the map and says how the recording opens."""
     from agents.recorder import RerunRecorder
 

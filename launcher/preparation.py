@@ -26,6 +26,9 @@ AGENT = "agent"
 GAP = 0.25
 """Automatic starts leave this share of a radius between two discs."""
 
+LARGE = 250
+"""Vertices from which on a map takes more than a second to prepare for planning."""
+
 
 @dataclass(frozen=True)
 class Preparation:
@@ -67,6 +70,8 @@ def prepare(file: Path, announce: Callable[[str], None]) -> Preparation:
     robot_discs = [(place, start, robots.radius_m) for place, start in named("robots.starts", starts).items()]
     ground.check_apart([("agent.start", agent.start, agent.radius_m), *robot_discs])
     mission = _mission(scenario, starts)
+    if len(environment.vertices) > LARGE:
+        announce(f"Preparing the planner for a map of {len(environment.vertices)} vertices ...")
     planner = Casting(mission, environment).planner()
     warnings = _check_robots_suffice(file, scenario, planner)
     return Preparation(scenario, environment, mission, planner, warnings)

@@ -1,8 +1,9 @@
 """Starting a peer's process, by fork or from scratch, and noticing its end. Linux.
 
-A launcher that has checked a scenario has imported everything that a peer needs and has loaded the compiled kernels.
-Its forks have all that at once and share the memory, where processes from scratch would spend a second of a processor
-each. A fork is sound only while the launcher has one thread: it forks before it opens a bus or an event loop.
+A launcher that has checked a scenario has imported nearly everything that a peer needs and has loaded the compiled
+kernels. Its forks have all that at once and share the memory, where processes from scratch would spend two seconds of a
+processor each. A fork is sound only before the launcher runs an event loop, a bus, a recording or a thread of its own;
+the idle threads that rerun and pyarrow start on import provide for forks themselves.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import asyncio
 import os
 import sys
+import time
 from pathlib import Path
 
 from agents import runtime
@@ -19,9 +21,10 @@ _ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 """A team has a process per peer already: no thread per core and process on top."""
 
 
-def can_fork() -> bool:
-    """Whether this process has one thread only, those of libraries included."""
-    return len(os.listdir("/proc/self/task")) == 1  # noqa: PTH208 (a path object per thread helps nobody)
+def age_s() -> float:
+    """How long ago this process was started, seconds."""
+    started = int(Path("/proc/self/stat").read_text(encoding="ascii", errors="replace").rpartition(")")[2].split()[19])
+    return time.clock_gettime(time.CLOCK_BOOTTIME) - started / os.sysconf("SC_CLK_TCK")
 
 
 def fork_peer(arguments: list[str], log: Path, planner: DeploymentPlanner) -> int:
@@ -32,7 +35,6 @@ def fork_peer(arguments: list[str], log: Path, planner: DeploymentPlanner) -> in
         log: appended to.
         planner: the team's; the base station's process uses it.
     """
-    runtime.import_all()
     sys.stdout.flush()
     sys.stderr.flush()
     pid = os.fork()

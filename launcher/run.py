@@ -16,10 +16,12 @@ from rich.console import Console
 from rich.live import Live
 
 from agents.mission import Mission
+from agents.runtime import import_all
 from launcher import status as display
 from launcher.console import tell
 from launcher.observer import Status, TeamView
 from launcher.preparation import Preparation, prepare
+from launcher.processes import age_s
 from launcher.run_folder import RunFolder
 from launcher.scenario import ScenarioFault
 from launcher.supervisor import Supervisor
@@ -47,7 +49,7 @@ class Course:
     """Why the run had to end, if it had to."""
 
 
-def run(file: Path, name: str | None, duration_s: float | None, console: Console, begun_s: float) -> Course:
+def run(file: Path, name: str | None, duration_s: float | None, console: Console) -> Course:
     """Run a scenario with real processes until its time is over, or Ctrl-C, or a peer that nobody can replace is lost.
 
     Args:
@@ -55,7 +57,6 @@ def run(file: Path, name: str | None, duration_s: float | None, console: Console
         name: of the run, or None.
         duration_s: replaces the scenario's, unless None.
         console: where to say what happens.
-        begun_s: monotonic time of the command.
 
     Raises:
         ScenarioFault: the scenario cannot be run; nothing has been started then.
@@ -64,6 +65,7 @@ def run(file: Path, name: str | None, duration_s: float | None, console: Console
     preparation = prepare(file, lambda text: tell(text, console))
     for warning in preparation.warnings:
         tell(f"Warning: {warning}", console, "yellow")
+    import_all()  # before mission time begins
     mission = preparation.mission
     endpoints = reserve_endpoints(file, preparation)
     roster = tuple(structs.replace(entry, endpoint=to) for entry, to in zip(mission.roster, endpoints, strict=True))
@@ -82,7 +84,7 @@ def run(file: Path, name: str | None, duration_s: float | None, console: Console
     supervisor = Supervisor(mission, folder.path, preparation.planner, lambda text: tell(text, console), view.position)
     supervisor.launch()
     tell("Processes: " + ", ".join(f"{peer.name} {peer.pid}" for peer in supervisor.peers.values()), console)
-    asyncio.run(_accompany(mission, view, supervisor, course, console, begun_s))
+    asyncio.run(_accompany(mission, view, supervisor, course, console))
     return course
 
 
@@ -106,7 +108,7 @@ def reserve_endpoints(file: Path, preparation: Preparation) -> list[str]:
 
 
 async def _accompany(
-    mission: Mission, view: TeamView, supervisor: Supervisor, course: Course, console: Console, begun_s: float
+    mission: Mission, view: TeamView, supervisor: Supervisor, course: Course, console: Console
 ) -> None:
     """Watch the team until the end, then stop it."""
     stop = asyncio.Event()
@@ -128,7 +130,7 @@ async def _accompany(
                         view.handle(event, now_s)
                 status = view.status(now_s)
                 show(status, now_s)
-                _note_obedience(status, mission, course, console, begun_s)
+                _note_obedience(status, mission, course, console)
                 course.failure = _irreplaceable_loss(supervisor, mission)
                 if course.failure or (mission.duration_s is not None and now_s >= mission.duration_s):
                     break
@@ -146,11 +148,11 @@ async def _accompany(
                 await closing
 
 
-def _note_obedience(status: Status, mission: Mission, course: Course, console: Console, begun_s: float) -> None:
+def _note_obedience(status: Status, mission: Mission, course: Course, console: Console) -> None:
     """Say once how long it took until every robot followed a deployment."""
     robots = {entry.name for entry in mission.robots}
     if course.obeyed_after_s is None and all(peer.obeying for peer in status.peers if peer.name in robots):
-        course.obeyed_after_s = time.monotonic() - begun_s
+        course.obeyed_after_s = age_s()
         tell(f"First deployment obeyed {course.obeyed_after_s:.1f} s after the command.", console)
 
 

@@ -20,7 +20,7 @@ from time import monotonic
 
 from agents.leader import DeploymentPlanner
 from agents.mission import Mission
-from launcher.processes import can_fork, fork_peer, spawn, wait_for_end
+from launcher.processes import fork_peer, spawn, wait_for_end
 from protocol.messages import Point
 
 RESTARTS = 3
@@ -73,7 +73,7 @@ class Supervisor:
         self._watchers: list[asyncio.Task[None]] = []
 
     def launch(self) -> None:
-        """Start a process for every peer. Best before there is an event loop or any other thread: then it can fork."""
+        """Start a process for every peer. Call it before there is an event loop, a bus or a thread: it forks."""
         (self._folder / "logs").mkdir(exist_ok=True)
         (self._folder / "recordings").mkdir(exist_ok=True)
         for peer in self.peers.values():
@@ -102,7 +102,7 @@ class Supervisor:
             *("--incarnation", str(peer.incarnation), "--launcher", str(os.getpid())),
             *([] if position is None else [f"--position={position[0]},{position[1]}"]),
         ]
-        if can_fork():
+        if peer.incarnation == 0:
             return fork_peer(arguments, self.log(peer), self._planner)
         # With -P, whatever the user's own folder holds, `agents` means ours.
         return spawn([sys.executable, "-P", "-m", "agents.runtime", *arguments], self.log(peer))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -25,9 +24,8 @@ Duration = Annotated[
 
 def demo(name: Name = None, duration_s: Duration = None) -> None:
     """Run the embedded scenario: an agent walks through an office, and robots keep it linked to the base station."""
-    begun_s = time.monotonic()
     with plainly():
-        _run(find_scenario(DEMO), name, duration_s, begun_s)
+        _run(find_scenario(DEMO), name, duration_s)
 
 
 def run(
@@ -36,9 +34,8 @@ def run(
     duration_s: Duration = None,
 ) -> None:
     """Run a scenario with a process for each peer, watch it live, and leave a recording in runs/."""
-    begun_s = time.monotonic()
     with plainly():
-        _run(find_scenario(scenario), name, duration_s, begun_s)
+        _run(find_scenario(scenario), name, duration_s)
 
 
 def goal(
@@ -57,11 +54,11 @@ def goal(
         tell(f"The agent goes to {x:g}, {y:g}.")
 
 
-def _run(file: Path, name: str | None, duration_s: float | None, begun_s: float) -> None:
+def _run(file: Path, name: str | None, duration_s: float | None) -> None:
     """Run, then merge, measure and say where everything is."""
     from launcher.run import run as run_team
 
-    course = run_team(file, name, duration_s, out, begun_s)
+    course = run_team(file, name, duration_s, out)
     _conclude(course)
     if course.failure:
         complain(course.failure)
