@@ -13,6 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
+
+from launcher.cli import app
 
 pytestmark = [pytest.mark.processes, pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")]
 
@@ -113,7 +116,7 @@ def start(tmp_path: Path) -> Iterator[Callable[[], Run]]:
         wait_for(lambda: not processes_of(tmp_path), "all processes to end")
 
 
-def test_a_run_from_start_to_recording(start: Callable[[], Run]) -> None:
+def test_a_run_from_start_to_recording(start: Callable[[], Run], monkeypatch: pytest.MonkeyPatch) -> None:
     run = start()
     run.says("First deployment obeyed")
     peers = processes_of(run.folder)
@@ -147,31 +150,28 @@ def test_a_run_from_start_to_recording(start: Callable[[], Run]) -> None:
     for log in (run.files / "logs").glob("*.log"):
         assert "Traceback" not in log.read_text(), log.read_text()
 
-    reviewed = run.sightline("review", "--json")
-    assert reviewed.returncode == 0, reviewed.stderr
+    monkeypatch.chdir(run.folder)
+    reviewed = CliRunner().invoke(app, ["review", "--json"])
+    assert reviewed.exit_code == 0, reviewed.output
     assert json.loads(reviewed.stdout)["whole_run"] == metrics["whole_run"]
-    nobody = run.sightline("goal", "1,1")
-    assert nobody.returncode == 2
+    nobody = CliRunner().invoke(app, ["goal", "1,1"])
+    assert nobody.exit_code == 2
     assert "does not run" in nobody.stderr
 
 
-def test_a_killed_launcher_leaves_no_process_behind(start: Callable[[], Run]) -> None:
+def test_what_cannot_run_starts_nothing_and_a_killed_launcher_leaves_nothing(start: Callable[[], Run]) -> None:
     run = start()
     wait_for(lambda: len(processes_of(run.folder)) == 4, "four processes")
-    run.launcher.kill()
-    wait_for(lambda: not processes_of(run.folder), "all peers to end")
-
-
-def test_a_run_that_cannot_be_starts_nothing(start: Callable[[], Run]) -> None:
-    run = start()
-    wait_for(lambda: processes_of(run.folder), "a process")
     again = run.sightline("run", "trial.toml", "--name", "trial")
     assert again.returncode == 2
     assert "runs/trial exists" in again.stderr
-    faulty = run.folder / "faulty.toml"
-    faulty.write_text(SCENARIO.replace("[1.0, 1.0]", "[8.5, 1]"))
+    (run.folder / "faulty.toml").write_text(SCENARIO.replace("[1.0, 1.0]", "[8.5, 1]"))
     failed = run.sightline("run", "faulty.toml")
     assert failed.returncode == 2
     assert failed.stderr.count("\n") == 1
     assert "base.position [8.5, 1] is inside a wall" in failed.stderr
     assert [folder.name for folder in (run.folder / "runs").iterdir() if not folder.is_symlink()] == ["trial"]
+    assert len(processes_of(run.folder)) == 4
+
+    run.launcher.kill()
+    wait_for(lambda: not processes_of(run.folder), "all peers to end")
