@@ -142,6 +142,9 @@ def cut_factor(
         across = math.sqrt(M * M * q + R / (2.0 * (n - 1.0)) + B)
         along = across * math.sqrt(q)
     along += rounding / reach
+    ratio = across ** (n - 1) * along
+    if ratio >= 1.0:
+        return REDUNDANT, 1.0, first, last, center, factor
     u = u / reach
     pull = factor @ u
     moved = center + M * (1.0 - q) * pull
@@ -149,4 +152,4 @@ def cut_factor(
     for i in range(factor.shape[0]):
         for j in range(n):
             smaller[i, j] = (1.0 + PADDING) * (across * factor[i, j] - (across - along) * pull[i] * u[j])
-    return CUT, across ** (n - 1) * along, first, last, moved, smaller
+    return CUT, ratio, first, last, moved, smaller

@@ -111,7 +111,9 @@ def test_emptiness_is_decided_exactly(seed: int, gap: float) -> None:
     pull = second.factor @ second.factor.T @ outward
     center = p + pull / np.sqrt(outward @ pull)
     apart = Ellipsoid(center + gap * outward, second.axes.copy(), second.semi_axes.copy())
-    together = Ellipsoid(center - gap * outward, second.axes.copy(), second.semi_axes.copy())
+    # Not so far that it comes out behind the first: half of the first's chord at p.
+    depth = outward @ first.inverse_shape @ (p - first.center) / (outward @ first.inverse_shape @ outward)
+    together = Ellipsoid(center - min(gap, depth) * outward, second.axes.copy(), second.semi_axes.copy())
     proof = fuse(first, apart)
     assert isinstance(proof, EmptyIntersection)
     assert proof.k < 0
