@@ -24,13 +24,14 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from agents.outlook import Outlook
 from agents.spares import Waiting
 from planning.chain import cheapest_chain
 from planning.decomposition import Kind, decompose
 from planning.deployment import NO_CHAIN, NoChain, identify_robots, relays_needed
 from planning.edge_weights import virtual_weights
 from planning.environment import Environment
-from planning.foresight import chain_holds, walk
+from planning.foresight import length, walk
 from planning.geodesic import GeodesicMap
 from planning.mutual_visibility import mutual_visibility
 from planning.placement import reachable_positions
@@ -39,24 +40,30 @@ from protocol.messages import Placement, Point
 
 Floats = NDArray[np.float64]
 
-PREVIEWS_M: Final = (0.0, 1.5, 4.0, 8.0)
+PREVIEWS_M: Final = (0.0, 1.5, 4.0, 8.0, 16.0)
 """How far ahead on the agent's path the proposed chains reach."""
 
 METRES_PER_WEIGHT: Final = 3.0
 """A virtual weight of 1 is worth so many metres of driving."""
 
+RELAY_M: Final = 1.5
+"""So many metres are driven rather than one relay more is used, besides what its link costs."""
+
 LATENESS: Final = 3.0
 """A metre that a robot drives while the agent is already where it needs it counts so many times more."""
 
-FORESIGHT_S: Final = 8.0
-STEP_S: Final = 0.25
-"""Proposals are followed so far, in such steps."""
-
 KEEPING_S: Final = 0.3
-"""Another proposal than the standing one must hold the chain so much longer."""
+"""Another proposal than the standing chain must be worth so many seconds more."""
 
-SPARE_S: Final = 0.1
-"""Being one relay fewer is worth as much as so many seconds of a chain."""
+MOST_CELLS: Final = 6000
+"""More cells take too much memory, and minutes of preparation."""
+
+
+IDENT = False
+
+
+class TooManyCells(ValueError):
+    """The decomposition of this map is too fine to plan on; the text says how fine, and the remedy."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +110,7 @@ class DeploymentPlanner:
 
     Raises:
         NoChain: the base station is outside the map.
+        TooManyCells: the map has more than :data:`MOST_CELLS`.
         ValueError: the map has no room for such robots around the base station.
     """
 
@@ -128,15 +136,22 @@ class DeploymentPlanner:
         self._estimates = GeodesicMap(environment)
         self._waiting = Waiting(self._geodesics, robot_radius_m)
         self._cells = decompose(environment, decomposition)
-        self._weights = virtual_weights(self._cells, mutual_visibility(self._cells))
+        if len(self._cells) > MOST_CELLS:
+            raise TooManyCells(
+                f"map {environment.name!r} has {len(self._cells)} {decomposition} cells, and at most {MOST_CELLS} "
+                "can be planned on: "
+                + ("use inflection cells" if decomposition == "aspect" else "simplify its outline")
+            )
+        seen = mutual_visibility(self._cells)
+        self._weights = virtual_weights(self._cells, seen)
         self._positions = reachable_positions(self._cells, free)
         self._placeable = ~np.isnan(self._positions[:, 0])
         self._places = np.flatnonzero(self._placeable)
         self._links = np.ascontiguousarray(METRES_PER_WEIGHT * self._weights[np.ix_(self._places, self._places)])
         self._base_cell = self._locate(base)
+        self._driven: dict[Point, Floats] = {}
         self._needed = relays_needed(self._weights, self._base_cell, self._placeable)
-        # The tree of fewest relays: a penalty above all else makes hops count first.
-        hops_first = self._weights + np.where(self._weights > 0, 2.0 * len(self._weights), 0.0)
+        hops_first = virtual_weights(self._cells, seen, robot_penalty="fewest")
         _, self._tree = from_source(hops_first, self._base_cell, self._placeable)
 
     def relays_needed(self, point: Point) -> int:
@@ -173,30 +188,41 @@ class DeploymentPlanner:
         try:
             needed = self.relays_needed(agent)
         except NoChain as problem:
-            standing = tuple(Placement(robot=name, position=place, spare=True) for name, place in robots.items())
-            return Plan(standing, (), 0.0, 0, False, f"{problem}: everybody waits")
+            waiting = tuple(Placement(robot=name, position=place, spare=True) for name, place in robots.items())
+            return Plan(waiting, (), 0.0, 0, False, f"{problem}: everybody waits")
         way = np.array([agent, *agent_path], dtype=np.float64)
         robots = {name: self._inside(place) for name, place in robots.items()}
-        proposals = self._proposals(way, robots, previous)
-        if not any(proposal.complete for proposal in proposals):
-            proposals = [self._outward(agent, robots, needed)]
-        chosen = self._best(proposals, way, robots)
+        standing = self._standing(way, robots, previous)
+        new = self._chains(way, robots, previous) or [self._outward(agent, robots, needed)]
+        chosen = self._best(standing, new, way, robots)
         return self._complete(chosen, way, robots, needed, previous)
 
-    def _proposals(self, way: Floats, robots: Mapping[str, Point], previous: Plan | None) -> list[Proposal]:
-        """What could be done, the standing chain first."""
-        proposals = []
-        relays = () if previous is None else tuple(place for place in previous.placements if not place.spare)
-        if previous is not None and previous.serves and all(relay.robot in robots for relay in relays):
-            proposals.append(Proposal(relays, previous.cost, True, previous.reason))
-        order = self._order(way[0], robots, relays)
-        drive = np.array([self._drive(robots[name]) for name in order]).reshape(len(order), len(self._places))
-        length = float(np.hypot(*np.diff(way, axis=0).T).sum())
-        for preview in sorted({min(preview, length) for preview in PREVIEWS_M}):
-            proposal = self._chain(way, preview, order, drive)
-            if proposal is not None and all(proposal.relays != other.relays for other in proposals):
-                proposals.append(proposal)
-        return proposals
+    def _standing(self, way: Floats, robots: Mapping[str, Point], previous: Plan | None) -> Proposal | None:
+        """The chain of the previous plan, if it was one and all its relays are still there."""
+        if previous is None or not previous.serves:
+            return None
+        relays = tuple(place for place in previous.placements if not place.spare)
+        if any(relay.robot not in robots for relay in relays):
+            return None
+        last = relays[-1].position if relays else self._base
+        ahead = walk(way, np.linspace(0.0, PREVIEWS_M[-1], 33))
+        serves = bool(np.any(self._environment.line_of_sight(np.array(last), ahead)))
+        reason = previous.reason if serves else f"{len(relays)} relays stay, which see nothing of the agent's way"
+        return Proposal(relays, previous.cost, serves, reason)
+
+    def _chains(self, way: Floats, robots: Mapping[str, Point], previous: Plan | None) -> list[Proposal]:
+        """New chains, one for each preview that the robots suffice for."""
+        order = self._order(way[0], robots, previous)
+        # Robots that stand where they stood need not be asked again.
+        places = self._positions[self._places]
+        self._driven = {
+            here: self._driven[here] if here in self._driven else self._estimates.lengths(here, places)
+            for here in robots.values()
+        }
+        drive = np.array([self._driven[robots[name]] for name in order]).reshape(len(order), len(self._places))
+        whole = length(way)
+        found = (self._chain(way, preview, order, drive) for preview in sorted({min(m, whole) for m in PREVIEWS_M}))
+        return [proposal for proposal in found if proposal is not None]
 
     def _chain(self, way: Floats, preview: float, order: list[str], drive: Floats) -> Proposal | None:
         """The cheapest chain for an agent that goes so far on its way; None if there are too few robots."""
@@ -214,14 +240,12 @@ class DeploymentPlanner:
             sees = np.isfinite(self._weights[np.ix_(covered, self._places)]).all(axis=0)
             to_agent = np.where(sees, METRES_PER_WEIGHT * self._weights[goal, self._places], np.inf)
             from_base = METRES_PER_WEIGHT * self._weights[self._base_cell, self._places]
-            chain = cheapest_chain(self._links, move, from_base, to_agent, 0.5 * METRES_PER_WEIGHT)
+            chain = cheapest_chain(self._links, move, from_base, to_agent, RELAY_M)
             if chain is not None:
-                relays = tuple(
-                    self._placement(order[robot], self._places[cell])
-                    for robot, cell in zip(chain.robots, chain.cells, strict=True)
-                )
-                hops = pairwise([self._base_cell, *(int(self._places[cell]) for cell in chain.cells), goal])
-                cost = float(sum(self._weights[hop] for hop in hops))
+                stops = [int(self._places[cell]) for cell in chain.cells]
+                robots = identify_robots(move[:, chain.cells])
+                relays = tuple(self._placement(order[robot], stop) for robot, stop in zip(robots, stops, strict=True))
+                cost = float(sum(self._weights[hop] for hop in pairwise([self._base_cell, *stops, goal])))
                 return Proposal(relays, cost, True, f"{len(relays)} relays {where}")
         return None
 
@@ -236,42 +260,21 @@ class DeploymentPlanner:
         reason = f"{needed} relays are needed and {missing} missing: the chain ends before the agent"
         return Proposal(relays, 0.0, False, reason)
 
-    def _best(self, proposals: list[Proposal], way: Floats, robots: Mapping[str, Point]) -> Proposal:
-        """The proposal under which the chain holds longest on the announced path."""
-        if len(proposals) == 1:
-            return proposals[0]
-        times = np.arange(STEP_S, FORESIGHT_S + STEP_S / 2, STEP_S)
-        agent = walk(way, times * self._agent_speed_m_s)
-        ways: dict[tuple[str, Point], Floats] = {}
-        behind = {
-            name: np.concatenate((self._geodesics.path(place, self._inside(way[0])), way[1:]))
-            for name, place in robots.items()
-        }
-        scores = []
-        for number, proposal in enumerate(proposals):
-            tracks = [np.broadcast_to(np.array(self._base), agent.shape)]
-            relays = {relay.robot: relay for relay in proposal.relays}
-            for name, place in robots.items():
-                if name in relays:
-                    key = name, relays[name].position
-                    if key not in ways:
-                        ways[key] = self._geodesics.path(place, key[1])
-                    tracks.append(walk(ways[key], times * self._robot_speed_m_s))
-                else:
-                    tracks.append(self._following(behind[name], way, times))
-            tracks.append(agent)
-            held = STEP_S * chain_holds(self._environment, np.stack(tracks, axis=1)).sum()
-            scores.append(held - SPARE_S * len(relays) + (KEEPING_S if number == 0 else 0.0))
-        return proposals[int(np.argmax(scores))]
-
-    def _following(self, route: Floats, way: Floats, times: Floats) -> Floats:
-        """A spare's track behind the agent."""
-        ahead = np.hypot(*np.diff(way, axis=0).T).sum()
-        whole = np.hypot(*np.diff(route, axis=0).T).sum()
-        agent_at = whole - ahead + np.minimum(times * self._agent_speed_m_s, ahead)
-        return walk(
-            route, np.clip(np.minimum(times * self._robot_speed_m_s, agent_at - self._waiting.pitch_m), 0.0, None)
-        )
+    def _best(
+        self, standing: Proposal | None, new: list[Proposal], way: Floats, robots: Mapping[str, Point]
+    ) -> Proposal:
+        """The proposal that is worth most, the standing chain when in doubt."""
+        outlook = Outlook(
+            self._environment, self._geodesics, self._base, way, robots,
+            agent_speed_m_s=self._agent_speed_m_s, robot_speed_m_s=self._robot_speed_m_s,
+            distance_m=self._waiting.pitch_m,
+        )  # fmt: skip
+        different = {proposal.relays: proposal for proposal in reversed(new)}
+        worth = {relays: outlook.worth(relays) for relays in different}
+        best = max(worth, key=lambda relays: worth[relays])
+        if standing is None or worth[best] > outlook.worth(standing.relays) + KEEPING_S:
+            return different[best]
+        return standing
 
     def _complete(
         self, chosen: Proposal, way: Floats, robots: Mapping[str, Point], needed: int, previous: Plan | None
@@ -288,14 +291,12 @@ class DeploymentPlanner:
         placements = tuple(Placement(robot=name, position=place, spare=True) for name, place in waiting.items())
         return Plan((*relays, *placements), tuple(pairwise(names)), chosen.cost, needed, chosen.complete, chosen.reason)
 
-    def _order(self, agent: Floats, robots: Mapping[str, Point], relays: Sequence[Placement]) -> list[str]:
-        """The relays of the standing chain from the base outward, then the others, nearest to the agent last."""
-        standing = [relay.robot for relay in relays if relay.robot in robots]
+    def _order(self, agent: Floats, robots: Mapping[str, Point], previous: Plan | None) -> list[str]:
+        """The relays of the previous plan from the base outward, then the others, nearest to the agent last."""
+        before = () if previous is None else previous.placements
+        standing = [place.robot for place in before if place.robot in robots and not place.spare]
         others = [name for name in robots if name not in standing]
         return [*standing, *sorted(others, key=lambda name: -math.dist(robots[name], agent))]
-
-    def _drive(self, here: Point) -> Floats:
-        return self._estimates.lengths(here, self._positions[self._places])
 
     def _placement(self, robot: str, cell: int) -> Placement:
         x, y = self._positions[cell]

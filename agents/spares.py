@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.foresight import walk
+from planning.foresight import length, walk
 from planning.geodesic import GeodesicMap
 from protocol.messages import Point
 
@@ -64,8 +64,8 @@ class Waiting:
         offset = self.pitch_m
         for relay in reversed(chain):
             way = self._geodesics.path(start, self._geodesics.nearest(relay))
-            length = float(np.hypot(*np.diff(way, axis=0).T).sum())
-            while offset < length and len(queue) < number:
+            whole = length(way)
+            while offset < whole and len(queue) < number:
                 place = _point(walk(way, np.array([offset]))[0])
                 if all(math.dist(place, other) >= self.pitch_m for other in (agent, *chain[1:], *queue)):
                     queue.append(place)
@@ -74,7 +74,7 @@ class Waiting:
                     offset += 0.25 * self.pitch_m
             if len(queue) == number:
                 return queue
-            offset = max(0.0, offset - length)
+            offset = max(0.0, offset - whole)
             start = _point(way[-1])
         return [*queue, *[start] * (number - len(queue))]
 

@@ -1,4 +1,4 @@
-"""What a decision leads to: everybody's way for the next seconds, and when the chain holds on it."""
+"""Looking ahead: where one is on a way, and at which times a team in motion is joined by lines of sight."""
 
 from __future__ import annotations
 
@@ -11,6 +11,12 @@ from planning.line_of_sight import free_points_see
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+
+
+def length(way: ArrayLike) -> float:
+    """Length of a polyline (m, 2), metres."""
+    points = np.asarray(way, dtype=np.float64).reshape(-1, 2)
+    return float(np.hypot(*np.diff(points, axis=0).T).sum())
 
 
 def walk(way: ArrayLike, lengths_m: Floats) -> Floats:
