@@ -50,6 +50,16 @@ def tell(text: str, console: Console = out, style: str = "") -> None:
     console.print(text, style=style, markup=False, highlight=False, soft_wrap=True)
 
 
+@contextlib.contextmanager
+def busy(text: str) -> Iterator[None]:
+    """Show on a terminal that something is going on, from a thread that ends with it; say nothing elsewhere."""
+    if not err.is_terminal:
+        yield
+        return
+    with err.status(text):
+        yield
+
+
 def complain(text: str) -> None:
     """Say what is wrong, on stderr, in one line."""
     tell(f"sightline: {text}", err, "red")

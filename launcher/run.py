@@ -18,7 +18,7 @@ from rich.live import Live
 from agents.mission import Mission
 from agents.runtime import import_all
 from launcher import status as display
-from launcher.console import tell
+from launcher.console import busy, tell
 from launcher.observer import Status, TeamView
 from launcher.preparation import Preparation, prepare
 from launcher.processes import age_s
@@ -62,10 +62,11 @@ def run(file: Path, name: str | None, duration_s: float | None, console: Console
         ScenarioFault: the scenario cannot be run; nothing has been started then.
     """
     tell(f"Checking {file} ...", console)
-    preparation = prepare(file, lambda text: tell(text, console))
+    with busy("Checking ..."):
+        preparation = prepare(file, lambda text: tell(text, console))
+        import_all()  # before mission time begins
     for warning in preparation.warnings:
         tell(f"Warning: {warning}", console, "yellow")
-    import_all()  # before mission time begins
     mission = preparation.mission
     endpoints = reserve_endpoints(file, preparation)
     roster = tuple(structs.replace(entry, endpoint=to) for entry, to in zip(mission.roster, endpoints, strict=True))

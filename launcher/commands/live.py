@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from launcher.console import complain, out, plainly, read_point, tell
+from launcher.console import busy, complain, out, plainly, read_point, tell
 from launcher.scenario import ScenarioFault, find_scenario
 
 if TYPE_CHECKING:
@@ -73,7 +72,7 @@ def _conclude(course: Course) -> None:
     from launcher.report import render
 
     folder = course.folder
-    with out.status("Merging the recordings ...") if out.is_terminal else contextlib.nullcontext():
+    with busy("Merging the recordings ..."):
         metrics = conclude(folder)
     out.print(render(metrics))
     tell(f"Recording  {folder.recording}")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from launcher.console import err, out, plainly, print_json, tell
+from launcher.console import busy, err, out, plainly, print_json, tell
 from launcher.scenario import ScenarioFault, find_scenario
 
 if TYPE_CHECKING:
@@ -53,8 +53,9 @@ def review(
 
     with plainly():
         folder = RunFolder.find(run)
-        # A launcher that was killed has not merged; merging again would miss nothing but takes a while.
-        metrics = measure_run(folder) if folder.recording.is_file() else conclude(folder)
+        with busy("Measuring ..."):
+            # A launcher that was killed has not merged its recordings.
+            metrics = measure_run(folder) if folder.recording.is_file() else conclude(folder)
         if as_json:
             print_json({"run": str(folder.path), "recording": str(folder.recording), **to_builtins(metrics)})
             return
@@ -80,7 +81,8 @@ def _simulate(file: Path, seeds: int, duration_s: float | None, record: Path | N
     from launcher.simulation import UNTIL_TOLD_S
     from launcher.simulation import simulate as simulate_mission
 
-    preparation = prepare(file, lambda text: tell(text, err))
+    with busy("Checking ..."):
+        preparation = prepare(file, lambda text: tell(text, err))
     for warning in preparation.warnings:
         tell(f"Warning: {warning}", err, "yellow")
     mission, environment = preparation.mission, preparation.environment

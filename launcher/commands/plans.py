@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from launcher.console import err, out, plainly, print_json, read_point, tell
+from launcher.console import busy, err, out, plainly, print_json, read_point, tell
 from launcher.scenario import ScenarioFault, find_map
 
 if TYPE_CHECKING:
@@ -81,7 +81,8 @@ def _describe_map(name: str, kind: Literal["inflection", "aspect"], picture: Pat
     warm_up(_say(as_json))
     from planning.decomposition import decompose
 
-    cells = decompose(environment, kind)
+    with busy("Decomposing ..."):
+        cells = decompose(environment, kind)
     facts = {
         **_facts(environment.name or file.stem, environment),
         "file": str(file),
@@ -157,7 +158,8 @@ def _plan(
     ground.room("--radius", radius_m, base, "--base")
     from agents.leader import DeploymentPlanner
 
-    planner = DeploymentPlanner(environment, base, radius_m, kind)
+    with busy("Planning ..."):
+        planner = DeploymentPlanner(environment, base, radius_m, kind)
     needed = planner.relays_needed(agent)
     if robots is not None and robots < needed:
         raise ScenarioFault(
