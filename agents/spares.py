@@ -16,6 +16,8 @@ from protocol.messages import Point
 STAND_OFF_M: Final = 0.4
 """Free distance between discs that wait."""
 
+ROUNDING_M: Final = 1e-6
+
 SETTLED_M: Final = 0.3
 """A place is not exchanged for one so near."""
 
@@ -41,24 +43,25 @@ class Waiting:
         Args:
             agent: where the agent is.
             chain: base station and relays, from the base station outward. The spares queue up along the geodesics from
-                the agent back to the last relay, to the one before, and so on to the base station.
+                the agent back to the last relay, to the one before, and so on to the base station. Where that is too
+                short a way for all, the farthest stay where they were sent last or, if nowhere, are.
             spares: where the spares are.
-            before: where spares were sent last; they stay where that is near enough.
+            before: where spares were sent last; they stay there if their new place is near it.
         """
         if not spares:
             return {}
         names = list(spares)
         lengths = self._geodesics.lengths(agent, [spares[name] for name in names])
         queue = self._queue(agent, chain, len(names))
-        waiting = {}
-        for place, index in zip(queue, np.argsort(lengths, kind="stable"), strict=True):
+        waiting = {name: before.get(name, spares[name]) for name in names}
+        for place, index in zip(queue, np.argsort(lengths, kind="stable"), strict=False):
             name = names[index]
-            settled = name in before and math.dist(before[name], place) < SETTLED_M
-            waiting[name] = before[name] if settled else place
-        return {name: waiting[name] for name in names}
+            if name not in before or math.dist(before[name], place) >= SETTLED_M:
+                waiting[name] = place
+        return waiting
 
     def _queue(self, agent: Point, chain: Sequence[Point], number: int) -> list[Point]:
-        """Places one pitch apart, clear of the relays; at the end of the way the last ones share it."""
+        """Places one pitch apart and clear of the relays: so many, or as many as the way is long enough for."""
         queue: list[Point] = []
         start = agent
         offset = self.pitch_m
@@ -67,7 +70,7 @@ class Waiting:
             whole = length(way)
             while offset < whole and len(queue) < number:
                 place = _point(walk(way, np.array([offset]))[0])
-                if all(math.dist(place, other) >= self.pitch_m for other in (agent, *chain[1:], *queue)):
+                if all(math.dist(place, other) > self.pitch_m - ROUNDING_M for other in (agent, *chain[1:], *queue)):
                     queue.append(place)
                     offset += self.pitch_m
                 else:
@@ -76,7 +79,7 @@ class Waiting:
                 return queue
             offset = max(0.0, offset - whole)
             start = _point(way[-1])
-        return [*queue, *[start] * (number - len(queue))]
+        return queue
 
 
 def _point(place: NDArray[np.float64]) -> Point:

@@ -101,7 +101,7 @@ def _area_costs(areas: NDArray[np.float64], area_cost: AreaCost) -> NDArray[np.f
     if area_cost == "negative-exponential":
         return np.asarray(np.exp(-areas))
     if area_cost == "inverse":
-        return 1.0 / np.maximum(areas, SMALLEST_AREA_SHARE * areas.sum())
+        return np.asarray(1.0 / np.maximum(areas, SMALLEST_AREA_SHARE * areas.sum()))
     raise ValueError(f"unknown area cost {area_cost!r}: use 'negative-exponential' or 'inverse'")
 
 
