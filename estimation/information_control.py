@@ -13,8 +13,8 @@ from the estimate, C the covariance of the set.
 no estimate yet, or a single point   zero: there is nothing to aim at, or nothing to gain
 robot at the estimate (b ≈ 0)        along the long axis of C, the half of it that points to +x (or +y): any step leads
                                      out of the place where the gradient has no value, and this one measures most
-gradient (almost) empty              circle: at right angles to the line of sight, to the left as seen from the robot;
-                                     so it is on the mirror line, where by symmetry nothing pulls to either side
+no pull (or almost) to either side   circle: at right angles to the line of sight, to the left as seen from the robot;
+                                     so it is on the mirror line, by symmetry, where it must be left
 ===================================  ==================================================================================
 """
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 EMPTY_GRADIENT = 1e-3
-"""Share of what the gradient could be at most, below which the robot circles."""
+"""Share of what the gradient could be at most, below which its part across the line of sight counts as empty."""
 
 AT_THE_ESTIMATE = 1e-3
 """Share of the set's size within which the robot counts as standing at the estimate."""
@@ -52,7 +52,7 @@ class EmbeddedSet(Protocol):
         """The set as numbers."""
 
 
-def information_gradient(shared: EmbeddedSet, position: ArrayLike, *, circle: bool = True) -> Floats:
+def information_gradient(shared: EmbeddedSet, position: ArrayLike) -> Floats:
     """Direction that makes the next range most informative: the thesis' law, eq. 17, corrected.
 
     Ĩ(u) = ½ tr(E⁻¹ HᵀRH) with H = [−2(a + u)ᵀ, 1]. Two corrections. The weight of a strip is the inverse *square* of
@@ -64,7 +64,6 @@ def information_gradient(shared: EmbeddedSet, position: ArrayLike, *, circle: bo
     Args:
         shared: the set that the team shares.
         position: (2,) float, metres, map frame: the robot.
-        circle: what to do where the gradient is empty: circle, or stay (the thesis' law without a kick).
 
     Returns:
         (2,) float: a unit vector, or zero; see the table above.
@@ -89,8 +88,10 @@ def information_gradient(shared: EmbeddedSet, position: ArrayLike, *, circle: bo
     variance = float(4 * b @ Pxx @ b - 4 * b @ Pxs + Pss)
     gradient = (4 * Pxx @ b - 2 * Pxs) * across - variance * b
     most = 4 * float(np.trace(Pxx)) * across**1.5 + variance * across**0.5
-    if float(np.linalg.norm(gradient)) < EMPTY_GRADIENT * most:
-        return _circle(b) if circle else np.zeros(2)
+    # The pull along the line of sight is never empty, and keeps the robot on a mirror line: look across.
+    aside = gradient - b * float(gradient @ b) / across
+    if float(np.linalg.norm(aside)) < EMPTY_GRADIENT * most:
+        return _circle(b)
     return _unit(gradient)
 
 

@@ -121,14 +121,6 @@ def test_on_the_mirror_line_the_robot_circles():
     assert off[1] > 0.9
 
 
-def test_without_the_kick_the_robot_stays():
-    filter_ = RangeFilter()
-    filter_.measure((0, 0), 10, 0.5)
-    # Nothing but a circle about the origin is known: off its centre only the radial pull is left, on a line through it.
-    direction = information_gradient(filter_, (3, 0), circle=False)
-    assert abs(direction[1]) < 1e-6
-
-
 def test_bad_numbers_are_named():
     with pytest.raises(NotAnEstimate, match="two finite numbers"):
         information_gradient(RangeFilter(), (np.nan, 0))

@@ -1,0 +1,405 @@
+"""The study of a data set: localise its beacons from the path, or its moving node from the beacons.
+
+*Beacons.* For each beacon in turn, scale and offset of the ranges are calibrated on the *other* beacons, so that nothing
+about it is known but its ranges. The set filters hear its ranges five times over (a static target: the same strips cut
+an ellipsoid again, a tight set hardly), and least squares is started from the tight set.
+
+*Target.* The offset of each beacon's ranges is learned on the first fifth of the time, where the path is taken as
+known; on the rest the moving node is followed with nothing but a bound on its speed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.calibration import calibrate
+from estimation.containment_monitor import ContainmentMonitor, Verdict
+from estimation.feasible_set import FeasibleSet, Region
+from estimation.range_filter import RangeFilter
+from estimation.tight_set import TightSet
+from launcher.studies import drawing
+from launcher.studies.range_data import BadData, RangeData
+
+Floats = NDArray[np.float64]
+
+PASSES = 5
+MARGIN = 1.15
+"""What a learned bound is multiplied with: the largest of the errors seen understates those to come."""
+LEARNED_SHARE = 0.2
+"""Part of the time on which a moving node's offsets are learned."""
+
+
+@dataclass(frozen=True)
+class BeaconFinding:
+    """What became of one beacon.
+
+    Attributes:
+        beacon: its name.
+        place: (2,) float, metres, its true place.
+        scale, offset_m, bound_m: how its ranges were read.
+        ranges: how many.
+        feasible: the ellipsoid's set after all passes.
+        tight: polygons of the tight set.
+        center: (2,) float, metres: the ellipsoid's centre.
+        solved: (2,) float, metres: least squares from the tight set.
+        tight_m2: area of the tight set.
+        inside, tight_inside: whether they hold the true place.
+        verdict: of the monitor over the tight set.
+    """
+
+    beacon: str
+    place: Floats
+    scale: float
+    offset_m: float
+    bound_m: float
+    ranges: int
+    feasible: FeasibleSet
+    tight: tuple[Floats, ...]
+    center: Floats
+    solved: Floats
+    tight_m2: float
+    inside: bool
+    tight_inside: bool
+    verdict: Verdict
+
+    @property
+    def center_error_m(self) -> float:
+        """Distance of the ellipsoid's centre from the true place."""
+        return float(np.hypot(*(self.center - self.place)))
+
+    @property
+    def solved_error_m(self) -> float:
+        """Distance of the least-squares position from the true place."""
+        return float(np.hypot(*(self.solved - self.place)))
+
+
+@dataclass(frozen=True)
+class TargetFinding:
+    """What became of the moving node, at each time that ranges came.
+
+    Attributes:
+        bound_m, speed_m_s: as used.
+        times: (k,) float, seconds.
+        truth: (k, 2) float, metres.
+        centers: (k, 2) float, metres: the ellipsoid's centre.
+        areas, tight_areas: (k,) float, m².
+        inside, tight_inside: (k,) bool.
+        rejected: ranges that the ellipsoid rejected.
+        ranges: ranges in all.
+        verdict: of the monitor over the tight set.
+    """
+
+    bound_m: float
+    speed_m_s: float
+    times: Floats
+    truth: Floats
+    centers: Floats
+    areas: Floats
+    tight_areas: Floats
+    inside: NDArray[np.bool_]
+    tight_inside: NDArray[np.bool_]
+    rejected: int
+    ranges: int
+    verdict: Verdict
+
+    @property
+    def errors_m(self) -> Floats:
+        """(k,) float: distance of the centre from the truth."""
+        return np.asarray(np.hypot(*(self.centers - self.truth).T))
+
+    @property
+    def rmse_m(self) -> float:
+        """Root of the mean squared error."""
+        return math.sqrt(float(np.mean(self.errors_m**2)))
+
+
+def find_beacons(data: RangeData, bound_m: float | None = None) -> list[BeaconFinding]:
+    """Localise every beacon; ε as given, or learned on the other beacons.
+
+    Raises:
+        BadData: fewer than two beacons with ranges.
+    """
+    names = [name for name in data.beacons if (data.names == name).sum() >= 3]
+    if len(names) < 2:
+        raise BadData(
+            f"{data.name}: {len(names)} beacons have three ranges or more; calibrating one on the others takes two"
+        )
+    return [_find_beacon(data, name, bound_m) for name in names]
+
+
+def _find_beacon(data: RangeData, name: str, bound_m: float | None) -> BeaconFinding:
+    own = data.names == name
+    learned = calibrate(data.distances[~own], data.ranges[~own])
+    bound = MARGIN * learned.bound_m if bound_m is None else bound_m
+    anchors, read = data.places[own], learned.read(data.ranges[own])
+    ellipsoid, tight, monitor = RangeFilter(), TightSet(), ContainmentMonitor()
+    verdict = monitor.verdict()
+    for number in range(PASSES):
+        for anchor, z in zip(anchors, read, strict=True):
+            ellipsoid.measure(anchor, float(z), bound)
+            if number == 0:
+                verdict = _watch(monitor, tight, anchor, float(z), bound)
+                tight.measure(anchor, float(z), bound)
+    feasible, place = ellipsoid.feasible_set(), data.beacons[name]
+    return BeaconFinding(
+        name,
+        place,
+        learned.scale,
+        learned.offset_m,
+        bound,
+        int(own.sum()),
+        feasible,
+        tight.polygons,
+        ellipsoid.center,
+        _solve(anchors, read, tight.centroid),
+        tight.area_m2,
+        bool(feasible.contains(place)),
+        bool(tight.contains(place)),
+        verdict,
+    )
+
+
+def _solve(anchors: Floats, read: Floats, start: Floats) -> Floats:
+    """Least squares over the ranges, from a start that is known to be near."""
+    from scipy.optimize import least_squares
+
+    answer = least_squares(lambda x: np.hypot(*(anchors - x).T) - read, start)
+    return np.asarray(answer.x, dtype=np.float64)
+
+
+def _watch(monitor: ContainmentMonitor, tight: TightSet, anchor: Floats, z: float, bound: float) -> Verdict:
+    """Show the monitor a range and the set before it."""
+    if not tight.started:
+        return monitor.verdict()
+    nearest, farthest = measure_polygons(tight.polygons, anchor)
+    return monitor.observe(z, bound, nearest, farthest)
+
+
+def measure_polygons(polygons: tuple[Floats, ...], point: Floats) -> tuple[float, float]:
+    """Least and greatest distance of convex polygons, counter-clockwise, from a point, metres."""
+    nearest, farthest = math.inf, 0.0
+    for ring in polygons:
+        away = ring - point
+        edges = np.roll(ring, -1, axis=0) - ring
+        farthest = max(farthest, float(np.hypot(*away.T).max()))
+        if (edges[:, 0] * away[:, 1] - edges[:, 1] * away[:, 0] <= 0).all():
+            return 0.0, max(farthest, *(float(np.hypot(*(other - point).T).max()) for other in polygons))
+        lengths = np.maximum((edges**2).sum(axis=1), 1e-300)
+        share = np.clip(-(away * edges).sum(axis=1) / lengths, 0, 1)
+        nearest = min(nearest, float(np.hypot(*(away + share[:, None] * edges).T).min()))
+    return nearest, farthest
+
+
+def find_target(data: RangeData, speed_m_s: float, bound_m: float | None = None) -> TargetFinding:
+    """Follow the moving node from the known beacons; ε as given, or learned with the offsets.
+
+    Raises:
+        BadData: a beacon has fewer than three ranges in the learning time, or nothing is left after it.
+    """
+    until = data.times[0] + LEARNED_SHARE * (data.times[-1] - data.times[0])
+    early = data.times <= until
+    offsets, bounds = {}, []
+    for name in data.beacons:
+        some = early & (data.names == name)
+        if some.sum() < 3:
+            raise BadData(
+                f"{data.name}: beacon '{name}' has {some.sum()} ranges in the first fifth of the time, and its offset "
+                "is learned there; it takes three"
+            )
+        learned = calibrate(data.distances[some], data.ranges[some], scale=1.0)
+        offsets[name] = learned.offset_m
+        bounds.append(learned.bound_m)
+    bound = MARGIN * max(bounds) if bound_m is None else bound_m
+    late = np.flatnonzero(~early)
+    if not len(late):
+        raise BadData(f"{data.name}: no range comes after the learning time; record for longer")
+    ellipsoid, tight, monitor = RangeFilter(), TightSet(), ContainmentMonitor()
+    rows: list[tuple[float, float, float, bool, bool]] = []
+    centers, moments = [], []
+    rejected, last_s = 0, data.times[late[0]]
+    verdict = monitor.verdict()
+    for place, index in enumerate(late):
+        moved = speed_m_s * float(data.times[index] - last_s)
+        ellipsoid.predict(moved)
+        tight.predict(moved)
+        last_s, name = data.times[index], str(data.names[index])
+        z = max(0.0, float(data.ranges[index]) + offsets[name])
+        anchor = data.beacons[name]
+        verdict = _watch(monitor, tight, anchor, z, bound)
+        rejected += ellipsoid.measure(anchor, z, bound).empty
+        tight.measure(anchor, z, bound)
+        if place + 1 == len(late) or data.times[late[place + 1]] > last_s:
+            feasible, truth = ellipsoid.feasible_set(), data.places[index]
+            inside = bool(feasible.contains(truth)), bool(tight.contains(truth))
+            rows.append((float(last_s), feasible.area_m2, tight.area_m2, *inside))
+            centers.append(ellipsoid.center)
+            moments.append(truth)
+    times, areas, tight_areas, holds, tight_holds = (np.array(column) for column in zip(*rows, strict=True))
+    return TargetFinding(
+        bound,
+        speed_m_s,
+        times,
+        np.array(moments),
+        np.array(centers),
+        areas,
+        tight_areas,
+        holds,
+        tight_holds,
+        rejected,
+        len(late),
+        verdict,
+    )
+
+
+def study_beacons(folder: Path, data: RangeData, bound_m: float | None, tell: Callable[[str], None] = print) -> str:
+    """Localise the beacons, draw them, and write the numbers; returns the summary."""
+    folder.mkdir(parents=True, exist_ok=True)
+    tell(f"{data.name}: {len(data.beacons)} beacons from {len(data.ranges)} ranges")
+    found = find_beacons(data, bound_m)
+    columns = ("beacon", "ranges", "scale", "offset_m", "bound_m", "center_error_m", "least_squares_error_m")
+    columns += ("area_m2", "tight_m2", "inside", "tight_inside")
+    rows = [
+        (one.beacon, one.ranges, one.scale, one.offset_m, one.bound_m, one.center_error_m, one.solved_error_m)
+        + (one.feasible.area_m2, one.tight_m2, int(one.inside), int(one.tight_inside))
+        for one in found
+    ]
+    drawing.write_table(folder / "beacons.csv", columns, rows)
+    _draw_beacons(data, found, folder / "beacons.png")
+    lines = [
+        f"{data.name}: {sum(one.inside for one in found)} of {len(found)} beacons inside the ellipsoid's set, "
+        f"{sum(one.tight_inside for one in found)} inside the tight set",
+        f"  error of the ellipsoid's centre after {PASSES} passes  mean {np.mean([r[5] for r in rows]):.3f} m, "
+        f"largest {max(one.center_error_m for one in found):.3f} m",
+        f"  least squares from the tight set            mean {np.mean([r[6] for r in rows]):.3f} m, "
+        f"largest {max(one.solved_error_m for one in found):.3f} m",
+        f"  tight set                                   {min(one.tight_m2 for one in found):.2f} to "
+        f"{max(one.tight_m2 for one in found):.2f} m²; ellipsoid's set mean "
+        f"{np.mean([one.feasible.area_m2 for one in found]):.1f} m²",
+    ]
+    lines += [
+        f"  beacon {one.beacon}: r = {one.scale:.4f} z {one.offset_m:+.3f} m, ε = {one.bound_m:.2f} m"
+        + _worry(one.verdict)
+        for one in found
+    ]
+    return _finish(folder, lines)
+
+
+def study_target(
+    folder: Path, data: RangeData, speed_m_s: float, bound_m: float | None, tell: Callable[[str], None] = print
+) -> str:
+    """Follow the moving node, draw it, and write the numbers; returns the summary."""
+    folder.mkdir(parents=True, exist_ok=True)
+    tell(f"{data.name}: a moving node from {len(data.ranges)} ranges to {len(data.beacons)} beacons")
+    found = find_target(data, speed_m_s, bound_m)
+    columns = (
+        "t_s",
+        "x_m",
+        "y_m",
+        "center_x_m",
+        "center_y_m",
+        "error_m",
+        "area_m2",
+        "tight_m2",
+        "inside",
+        "tight_inside",
+    )
+    series = (found.truth, found.centers, found.errors_m[:, None], found.areas[:, None], found.tight_areas[:, None])
+    numbers = np.hstack([found.times[:, None], *series])
+    drawing.write_table(
+        folder / "target.csv",
+        columns,
+        [
+            (*map(float, line), int(inside), int(tight))
+            for line, inside, tight in zip(numbers, found.inside, found.tight_inside, strict=True)
+        ],
+    )
+    _draw_target(data, found, folder / "target.png")
+    lines = [
+        f"{data.name}: ε = {found.bound_m:.2f} m, v = {found.speed_m_s:g} m/s, {found.ranges} ranges at "
+        f"{len(found.times)} times, {found.rejected} rejected",
+        f"  ellipsoid  RMSE {found.rmse_m:.3f} m, outside {1 - found.inside.mean():.2%} of the time, median area "
+        f"{np.median(found.areas):.2f} m²",
+        f"  tight set  outside {1 - found.tight_inside.mean():.2%} of the time, median area "
+        f"{np.median(found.tight_areas):.2f} m²" + _worry(found.verdict),
+    ]
+    return _finish(folder, lines)
+
+
+def _worry(verdict: Verdict) -> str:
+    if not verdict.too_small:
+        return ""
+    return (
+        f" – the monitor says that ε is too small: {verdict.contradictions} of the last {verdict.ranges} ranges "
+        f"contradict the set; try {verdict.suggested_bound_m:.2f} m or more"
+    )
+
+
+def _finish(folder: Path, lines: list[str]) -> str:
+    text = "\n".join(lines) + "\n"
+    (folder / "summary.txt").write_text(text, encoding="utf-8")
+    return text
+
+
+def _draw_beacons(data: RangeData, found: list[BeaconFinding], file: Path) -> None:
+    columns = math.ceil(len(found) / 2)
+    figure = drawing.new_figure(5.5 + 3.2 * columns, 6.4)
+    figure.suptitle(f"{data.name}: beacons from ranges alone", fontsize=11, x=0.01, ha="left")
+    grid = figure.add_gridspec(2, columns + 2)
+    whole = figure.add_subplot(grid[:, :2])
+    whole.plot(*data.path[:, 1:].T, color=drawing.ROBOTS[0], linewidth=0.5, alpha=0.7, label="path")
+    for one in found:
+        whole.plot(*one.place, "D", color=drawing.INK, markersize=5)
+        whole.annotate(one.beacon, one.place, (5, 4), textcoords="offset points", fontsize=9)
+    drawing.dress_plane(
+        whole, "path and beacons [m]", *_window(np.vstack([data.path[:, 1:], *[f.place for f in found]]))
+    )
+    for number, one in enumerate(found):
+        axes = figure.add_subplot(grid[number // columns, 2 + number % columns])
+        drawing.draw_ellipse(axes, one.feasible.base_projection(), drawing.PROJECTION, "base projection")
+        drawing.draw_regions(axes, one.feasible.regions, drawing.FEASIBLE, "feasible set", alpha=0.25)
+        drawing.draw_regions(axes, [Region(piece) for piece in one.tight], drawing.TIGHT, "tight set", 0.9, 0.5)
+        axes.plot(*one.center, "x", color=drawing.FEASIBLE, markersize=6, label="centre", zorder=8)
+        axes.plot(*one.solved, "o", color=drawing.SLICE, markersize=4, label="least squares", zorder=8)
+        axes.plot(*one.place, "+", color=drawing.INK, markersize=10, label="truth", zorder=8)
+        low, high = one.feasible.base_projection().bounding_box()
+        middle, half = 0.5 * (low + high), 0.55 * float((high - low).max())
+        title = f"beacon {one.beacon}: {one.feasible.area_m2:.1f} and {one.tight_m2:.2f} m²"
+        drawing.dress_plane(axes, title, middle - half, middle + half)
+    drawing.legend_below(figure, axes, 6)
+    drawing.write_figure(figure, file)
+
+
+def _draw_target(data: RangeData, found: TargetFinding, file: Path) -> None:
+    figure = drawing.new_figure(12, 6)
+    figure.suptitle(f"{data.name}: a moving node from ranges alone", fontsize=11, x=0.01, ha="left")
+    grid = figure.add_gridspec(2, 2, width_ratios=(1, 1.25))
+    plane = figure.add_subplot(grid[:, 0])
+    plane.plot(*found.truth.T, color=drawing.INK, linewidth=1.2, label="truth")
+    plane.plot(*found.centers.T, color=drawing.FEASIBLE, linewidth=0.7, alpha=0.8, label="ellipsoid's centre")
+    places = np.array(list(data.beacons.values()))
+    plane.plot(*places.T, "D", color=drawing.ROBOTS[0], markersize=5, linestyle="none", label="beacons")
+    drawing.dress_plane(plane, "path [m]", *_window(np.vstack([places, found.truth])))
+    plane.legend(fontsize=8, frameon=False, loc="upper right")
+    errors = figure.add_subplot(grid[0, 1])
+    errors.plot(found.times, found.errors_m, color=drawing.FEASIBLE, linewidth=0.8)
+    outside = found.times[~found.inside]
+    errors.plot(outside, np.zeros(len(outside)), "x", color=drawing.INK, label="outside")
+    drawing.dress_series(errors, f"error of the centre, RMSE {found.rmse_m:.3f} m", "time [s]", "metres")
+    areas = figure.add_subplot(grid[1, 1])
+    areas.semilogy(found.times, found.areas, color=drawing.FEASIBLE, linewidth=0.8, label="feasible set")
+    areas.semilogy(found.times, found.tight_areas, color=drawing.TIGHT, linewidth=0.8, label="tight set")
+    drawing.dress_series(areas, "area", "time [s]", "m²")
+    areas.legend(fontsize=8, frameon=False)
+    drawing.write_figure(figure, file)
+
+
+def _window(points: Floats) -> tuple[Floats, Floats]:
+    low, high = points.min(axis=0), points.max(axis=0)
+    margin = 0.06 * float((high - low).max())
+    return low - margin, high + margin
