@@ -20,6 +20,7 @@ from launcher.cli import app
 pytestmark = [pytest.mark.processes, pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")]
 
 SIGHTLINE = Path(sys.executable).with_name("sightline")
+EXAMPLE = Path(__file__).parents[2] / "examples" / "watch_and_send_goal.py"
 PATIENCE_S = 45.0
 """How long a test waits for what has to come; generous, since nothing is measured by it."""
 
@@ -125,6 +126,15 @@ def test_a_run_from_start_to_recording(start: Callable[[], Run], monkeypatch: py
     refused = run.sightline("goal", "8.5,5")
     assert refused.returncode == 2
     assert refused.stderr.startswith("sightline: the agent refuses 8.5,5")
+    example = subprocess.run(
+        [sys.executable, EXAMPLE, "--mission", "runs/trial/mission.json", "--goal", "7,5", "--seconds", "2"],
+        cwd=run.folder,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_S,
+        check=False,
+    )
+    assert example.returncode == 0, example.stdout + example.stderr
     accepted = run.sightline("goal", "14,5", "--run", "runs/trial")
     assert (accepted.returncode, accepted.stderr) == (0, "")
     assert "14, 5" in accepted.stdout
