@@ -1,0 +1,262 @@
+"""The tight set: where the target can be, as a union of convex polygons, within a few per cent of the truth.
+
+An ellipsoid is loose: after many ranges its feasible set is tens of times the intersection of the annuli. This follows
+the intersection itself, in the plane, at about the same cost, and never loses the target either. Deployments plan with
+it. It begins with the first range; one range leaves a ring of thin wedges.
+
+What is approximated always is outwards: circles by tangents and chords no farther off than :data:`FINENESS` of the
+set's size, a move by a polygon around a disc, polygons of too many vertices by fewer, too many pieces by hulls. As the
+set shrinks, cuts that were fine enough become coarse; so the last ranges are remembered and cut again when the set has
+become half as wide. Ranges older than a move of the target are remembered with wider bounds.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from estimation import convex_pieces
+from estimation.convex_pieces import MOST_PIECES, MOST_VERTICES
+from estimation.outlier_rule import Outliers, make_rule
+from estimation.range_measurement import (
+    PADDING_M,
+    Annulus,
+    Bound,
+    MeasurementReport,
+    NothingMeasured,
+    annulus,
+    moved_distance,
+)
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+FINENESS = 0.01
+"""How far a cut may stay from its circle, as a share of the set's size and of the annulus's width."""
+
+MERGE_SHARE = 0.002
+"""Neighbouring pieces are merged where their hull adds no more than this share of their area."""
+
+REMEMBERED = 24
+"""Ranges that are cut again when the set has shrunk."""
+
+
+@dataclass(frozen=True, slots=True)
+class TightReport(MeasurementReport):
+    """What a range did to the tight set.
+
+    Attributes:
+        area_before: m², inf before the first range.
+        area_after: m² after it.
+        pieces: convex polygons after it.
+    """
+
+    area_before: float
+    area_after: float
+    pieces: int
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Union:
+    """Pieces and what is needed to cut them finer, in the frame of the tight set."""
+
+    pieces: Floats
+    """(m, MOST_VERTICES, 2) float, metres."""
+    counts: Ints
+    """(m,) int, vertices of each."""
+    area: float
+    remembered: tuple[Annulus, ...]
+    cut_at: float
+    """Size, the square root of the area, at which the remembered ranges were cut last."""
+
+
+class _Polygons:
+    """Operations of the outlier rules on unions. Annuli come in the frame of the tight set."""
+
+    def __init__(self) -> None:
+        self._out = np.empty((MOST_PIECES, MOST_VERTICES, 2))
+        self._kept = np.empty(MOST_PIECES, dtype=np.int64)
+
+    def _take(self, m: int, remembered: tuple[Annulus, ...], cut_at: float) -> _Union:
+        """The first m pieces of the output, merged where that costs little."""
+        m = convex_pieces.merge(self._out, self._kept, m, MERGE_SHARE, MOST_PIECES // 2)
+        pieces, counts = self._out[:m].copy(), self._kept[:m].copy()
+        return _Union(pieces, counts, convex_pieces.total_area(pieces, counts), remembered, cut_at)
+
+    def begin(self, annulus: Annulus) -> _Union:
+        size = math.sqrt(math.pi * (annulus.outer - annulus.inner) * (annulus.outer + annulus.inner))
+        m = convex_pieces.ring(*annulus, _tolerance(size, annulus), self._out, self._kept)
+        return self._take(m, (annulus,), size)
+
+    def cut(self, held: _Union, annulus: Annulus) -> _Union | None:
+        rest = self._cut(held, annulus)
+        if rest is None or rest is held:
+            return rest
+        remembered = (*held.remembered[1 - REMEMBERED :], annulus)
+        size = math.sqrt(rest.area)
+        if size > 0.5 * held.cut_at:
+            return _Union(rest.pieces, rest.counts, rest.area, remembered, held.cut_at)
+        for old in remembered[:-1]:
+            again = self._cut(rest, old)
+            if again is None:
+                return None
+            rest = again
+        return _Union(rest.pieces, rest.counts, rest.area, remembered, size)
+
+    def _cut(self, held: _Union, annulus: Annulus) -> _Union | None:
+        tolerance = _tolerance(math.sqrt(held.area), annulus)
+        m, changed = convex_pieces.cut(held.pieces, held.counts, *annulus, tolerance, self._out, self._kept)
+        if m == 0:
+            return None
+        return self._take(m, held.remembered, held.cut_at) if changed else held
+
+    def cut_or(self, held: _Union | None, fallback: _Union, annulus: Annulus) -> _Union:
+        inside = self.begin(annulus) if held is None else self._cut(held, annulus)
+        parts = [] if inside is None else [inside]
+        # Padded the other way: outside of the annulus means outside of what a right range can leave.
+        hole, rim = annulus.inner + 2.0 * PADDING_M, annulus.outer - 2.0 * PADDING_M
+        for x, y, low, high in ((annulus.x, annulus.y, 0.0, hole), (annulus.x, annulus.y, rim, math.inf)):
+            outside = self._cut(fallback, Annulus(x, y, low, high))
+            if outside is not None:
+                parts.append(outside)
+        pieces = np.concatenate([part.pieces for part in parts])
+        counts = np.concatenate([part.counts for part in parts])
+        area = sum(part.area for part in parts)
+        if len(counts) > MOST_PIECES // 2:
+            m = convex_pieces.merge(pieces, counts, len(counts), MERGE_SHARE, MOST_PIECES // 2)
+            pieces, counts = pieces[:m].copy(), counts[:m].copy()
+            area = convex_pieces.total_area(pieces, counts)
+        return _Union(pieces, counts, area, (), math.sqrt(area))
+
+    def grow(self, held: _Union, distance_m: float) -> _Union:
+        m = convex_pieces.grow(held.pieces, held.counts, distance_m, self._out, self._kept)
+        remembered = tuple(
+            Annulus(x, y, max(0.0, inner - distance_m), outer + distance_m) for x, y, inner, outer in held.remembered
+        )
+        return self._take(m, remembered, held.cut_at)
+
+
+def _tolerance(size: float, annulus: Annulus) -> float:
+    return FINENESS * min(size, annulus.outer - annulus.inner) + 1e-9
+
+
+class TightSet:
+    """A union of convex polygons around the intersection of annuli: the target is inside, always.
+
+    Args:
+        outliers: as for `RangeFilter`: "reject", "relaxed" or a `Relaxation`. Relaxed, no ranges are cut again.
+
+    Raises:
+        ValueError: no such way to handle outliers.
+    """
+
+    def __init__(self, outliers: Outliers = "reject") -> None:
+        self._rule = make_rule(_Polygons(), outliers)
+        self._origin: tuple[float, float] | None = None
+
+    @property
+    def started(self) -> bool:
+        """Whether anything is known."""
+        return self._rule.held is not None
+
+    @property
+    def _union(self) -> _Union:
+        if self._rule.held is None:
+            raise NothingMeasured("no range has bounded the set yet: call measure() first, or ask `started`")
+        return self._rule.held
+
+    def measure(self, anchor_xy: ArrayLike, range_m: float, bound_m: Bound) -> TightReport:
+        """Take a range into account.
+
+        Args:
+            anchor_xy: (2,) float, where the range was measured from, metres, map frame.
+            range_m: z, metres.
+            bound_m: ε, or (below, above): the true distance lies in [z − below, z + above].
+
+        Raises:
+            BadRange: a number is not finite, or a bound is negative. The set is as it was.
+        """
+        possible = annulus(anchor_xy, range_m, bound_m)
+        if self._origin is None:
+            # The frame is where the first range was measured; differences to it are exact enough from anywhere.
+            self._origin = (possible.x, possible.y)
+        here = Annulus(possible.x - self._origin[0], possible.y - self._origin[1], possible.inner, possible.outer)
+        before = self._rule.held
+        report = self._rule.measure(here)
+        after = self._rule.held
+        return TightReport(
+            report.accepted,
+            report.redundant,
+            report.empty,
+            report.restarted,
+            math.inf if before is None else before.area,
+            math.inf if after is None else after.area,
+            0 if after is None else len(after.counts),
+        )
+
+    def predict(self, distance_m: float) -> None:
+        """The target may have moved by so many metres since; nothing happens before the first range.
+
+        Raises:
+            BadRange: the distance is negative or not finite.
+        """
+        self._rule.predict(moved_distance(distance_m))
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self._rule.reset()
+        self._origin = None
+
+    @property
+    def area_m2(self) -> float:
+        """Area, m²; overlaps that could not be parted count twice. Raises NothingMeasured before the first range."""
+        return self._union.area
+
+    @property
+    def _moments(self) -> Floats:
+        return convex_pieces.moments(self._union.pieces, self._union.counts)
+
+    @property
+    def centroid(self) -> Floats:
+        """(2,) float, metres, map frame. Raises NothingMeasured before the first range."""
+        total = self._moments
+        return total[1:3] / total[0] + np.asarray(self._origin)
+
+    @property
+    def covariance(self) -> Floats:
+        """(2, 2) float, m², of a point spread evenly over the set. Raises NothingMeasured before the first range."""
+        total = self._moments
+        mean = total[1:3] / total[0]
+        covariance: Floats = total[[[3, 4], [4, 5]]] / total[0] - np.outer(mean, mean)
+        return covariance
+
+    @property
+    def polygons(self) -> tuple[Floats, ...]:
+        """The pieces, (n, 2) float each, counter-clockwise, metres, map frame. Neighbours share edges."""
+        union = self._union
+        return tuple(
+            piece[:count] + np.asarray(self._origin) for piece, count in zip(union.pieces, union.counts, strict=True)
+        )
+
+    def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
+        """Which points are in the set.
+
+        Args:
+            points: (..., 2) float, metres, map frame.
+
+        Returns:
+            (...) bool.
+        """
+        union = self._union
+        offsets = np.asarray(points, dtype=np.float64) - np.asarray(self._origin)
+        inside = convex_pieces.contains(union.pieces, union.counts, np.ascontiguousarray(offsets.reshape(-1, 2)))
+        return inside.reshape(offsets.shape[:-1])
+
+    def farthest_point(self, start: ArrayLike) -> Floats:
+        """(2,) float, the point of the set farthest from a point (2,), metres, map frame: always a vertex."""
+        vertices = np.concatenate(self.polygons)
+        point: Floats = vertices[np.argmax(np.hypot(*(vertices - np.asarray(start, dtype=np.float64)).T))]
+        return point
