@@ -10,7 +10,7 @@ import typer
 # The launcher forks, which is sound with one thread only; numpy's would be idle anyway.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from launcher.commands import live, offline, plans
+from launcher.commands import live, offline, plans, study
 
 app = typer.Typer(
     name="sightline",
@@ -30,6 +30,7 @@ app.command()(offline.simulate)
 app.command()(plans.plan)
 app.command(name="map")(plans.show)
 app.command()(offline.review)
+app.add_typer(study.app, name="study")
 
 
 def _print_version(wanted: bool) -> None:

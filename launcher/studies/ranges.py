@@ -1,8 +1,8 @@
 """The study of a data set: localise its beacons from the path, or its moving node from the beacons.
 
-*Beacons.* For each beacon in turn, scale and offset of the ranges are calibrated on the *other* beacons, so that nothing
-about it is known but its ranges. The set filters hear its ranges five times over (a static target: the same strips cut
-an ellipsoid again, a tight set hardly), and least squares is started from the tight set.
+*Beacons.* For each beacon in turn, scale and offset of the ranges are calibrated on the *other* beacons, so that
+nothing about it is known but its ranges. The ellipsoid hears them five times over, since a target at rest may be cut by
+the same strips again; the tight set once; and least squares is started from the tight set.
 
 *Target.* The offset of each beacon's ranges is learned on the first fifth of the time, where the path is taken as
 known; on the rest the moving node is followed with nothing but a bound on its speed.
@@ -169,8 +169,10 @@ def _solve(anchors: Floats, read: Floats, start: Floats) -> Floats:
     """Least squares over the ranges, from a start that is known to be near."""
     from scipy.optimize import least_squares
 
-    answer = least_squares(lambda x: np.hypot(*(anchors - x).T) - read, start)
-    return np.asarray(answer.x, dtype=np.float64)
+    def misfit(x: Floats) -> Floats:
+        return np.asarray(np.hypot(*(anchors - x).T) - read)
+
+    return np.asarray(least_squares(misfit, start).x, dtype=np.float64)
 
 
 def _watch(monitor: ContainmentMonitor, tight: TightSet, anchor: Floats, z: float, bound: float) -> Verdict:
@@ -262,24 +264,24 @@ def study_beacons(folder: Path, data: RangeData, bound_m: float | None, tell: Ca
     folder.mkdir(parents=True, exist_ok=True)
     tell(f"{data.name}: {len(data.beacons)} beacons from {len(data.ranges)} ranges")
     found = find_beacons(data, bound_m)
-    columns = ("beacon", "ranges", "scale", "offset_m", "bound_m", "center_error_m", "least_squares_error_m")
-    columns += ("area_m2", "tight_m2", "inside", "tight_inside")
+    reading = ("beacon", "ranges", "scale", "offset_m", "bound_m")
+    result = ("center_error_m", "solved_error_m", "tight_m2", "inside", "tight_inside")
     rows = [
-        (one.beacon, one.ranges, one.scale, one.offset_m, one.bound_m, one.center_error_m, one.solved_error_m)
-        + (one.feasible.area_m2, one.tight_m2, int(one.inside), int(one.tight_inside))
+        (*(getattr(one, name) for name in reading), one.feasible.area_m2, *(getattr(one, name) for name in result))
         for one in found
     ]
-    drawing.write_table(folder / "beacons.csv", columns, rows)
+    drawing.write_table(folder / "beacons.csv", (*reading, "area_m2", *result), rows)
     _draw_beacons(data, found, folder / "beacons.png")
+    errors = {
+        f"error of the ellipsoid's centre after {PASSES} passes": [one.center_error_m for one in found],
+        "error of least squares from the tight set": [one.solved_error_m for one in found],
+    }
     lines = [
         f"{data.name}: {sum(one.inside for one in found)} of {len(found)} beacons inside the ellipsoid's set, "
         f"{sum(one.tight_inside for one in found)} inside the tight set",
-        f"  error of the ellipsoid's centre after {PASSES} passes  mean {np.mean([r[5] for r in rows]):.3f} m, "
-        f"largest {max(one.center_error_m for one in found):.3f} m",
-        f"  least squares from the tight set            mean {np.mean([r[6] for r in rows]):.3f} m, "
-        f"largest {max(one.solved_error_m for one in found):.3f} m",
-        f"  tight set                                   {min(one.tight_m2 for one in found):.2f} to "
-        f"{max(one.tight_m2 for one in found):.2f} m²; ellipsoid's set mean "
+        *(f"  {name:47} mean {np.mean(some):.3f} m, largest {max(some):.3f} m" for name, some in errors.items()),
+        f"  {'area of the tight set':47} {min(one.tight_m2 for one in found):.2f} to "
+        f"{max(one.tight_m2 for one in found):.2f} m², of the ellipsoid's mean "
         f"{np.mean([one.feasible.area_m2 for one in found]):.1f} m²",
     ]
     lines += [
@@ -297,23 +299,12 @@ def study_target(
     folder.mkdir(parents=True, exist_ok=True)
     tell(f"{data.name}: a moving node from {len(data.ranges)} ranges to {len(data.beacons)} beacons")
     found = find_target(data, speed_m_s, bound_m)
-    columns = (
-        "t_s",
-        "x_m",
-        "y_m",
-        "center_x_m",
-        "center_y_m",
-        "error_m",
-        "area_m2",
-        "tight_m2",
-        "inside",
-        "tight_inside",
-    )
+    columns = ("t_s", "x_m", "y_m", "center_x_m", "center_y_m", "error_m", "area_m2", "tight_m2")
     series = (found.truth, found.centers, found.errors_m[:, None], found.areas[:, None], found.tight_areas[:, None])
     numbers = np.hstack([found.times[:, None], *series])
     drawing.write_table(
         folder / "target.csv",
-        columns,
+        (*columns, "inside", "tight_inside"),
         [
             (*map(float, line), int(inside), int(tight))
             for line, inside, tight in zip(numbers, found.inside, found.tight_inside, strict=True)
@@ -353,12 +344,11 @@ def _draw_beacons(data: RangeData, found: list[BeaconFinding], file: Path) -> No
     grid = figure.add_gridspec(2, columns + 2)
     whole = figure.add_subplot(grid[:, :2])
     whole.plot(*data.path[:, 1:].T, color=drawing.ROBOTS[0], linewidth=0.5, alpha=0.7, label="path")
-    for one in found:
-        whole.plot(*one.place, "D", color=drawing.INK, markersize=5)
-        whole.annotate(one.beacon, one.place, (5, 4), textcoords="offset points", fontsize=9)
-    drawing.dress_plane(
-        whole, "path and beacons [m]", *_window(np.vstack([data.path[:, 1:], *[f.place for f in found]]))
-    )
+    places = np.array([one.place for one in found])
+    whole.plot(*places.T, "D", color=drawing.INK, markersize=5, linestyle="none")
+    for one, (x, y) in zip(found, places, strict=True):
+        whole.annotate(one.beacon, (float(x), float(y)), (5, 4), textcoords="offset points", fontsize=9)
+    drawing.dress_plane(whole, "path and beacons [m]", *_window(np.vstack([data.path[:, 1:], places])))
     for number, one in enumerate(found):
         axes = figure.add_subplot(grid[number // columns, 2 + number % columns])
         drawing.draw_ellipse(axes, one.feasible.base_projection(), drawing.PROJECTION, "base projection")

@@ -1,0 +1,64 @@
+"""``study``: experiments that are run, drawn and summed up."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from launcher.console import plainly, tell
+
+app = typer.Typer(no_args_is_help=True, help="Run an experiment; leave figures, and the CSV files they are drawn from.")
+
+Output = Annotated[Path | None, typer.Option(help="Folder to write to; runs/studies/NAME if not given.")]
+
+
+@app.command()
+def localization(
+    seeds: Annotated[int, typer.Option(min=2, max=1000, help="Runs of each experiment and control law.")] = 20,
+    output: Output = None,
+) -> None:
+    """Robots find a target by ranges and choose where to go: thesis chapter 2, figures 10 and 12 to 18."""
+    with plainly():
+        from launcher.studies.localization import study_localization
+
+        folder = output or _default("localization")
+        # Before the work: a folder that cannot be made costs no time.
+        folder.mkdir(parents=True, exist_ok=True)
+        text = study_localization(folder, seeds, tell)
+        tell(text)
+        tell(f"Figures, tables and summary.md: {folder}")
+
+
+@app.command()
+def ranges(
+    data: Annotated[Path, typer.Option(help="Folder with path.csv, beacons.csv and ranges.csv.")],
+    find: Annotated[
+        Literal["beacons", "target"], typer.Option(help="What to localise: the beacons, or the node that moves.")
+    ] = "beacons",
+    bound_m: Annotated[
+        float | None, typer.Option("--bound", min=1e-3, max=1e3, help="Largest error of a range, metres; else learned.")
+    ] = None,
+    speed_m_s: Annotated[
+        float, typer.Option("--speed", min=0.0, max=1e3, help="Most that the moving node does, metres a second.")
+    ] = 1.0,
+    output: Output = None,
+) -> None:
+    """Localise the beacons, or the moving node, of a data set from its ranges alone."""
+    with plainly():
+        from launcher.studies.range_data import read_range_data
+        from launcher.studies.ranges import study_beacons, study_target
+
+        folder = output or _default(f"ranges-{data.resolve().name}-{find}")
+        known = read_range_data(data)
+        if find == "beacons":
+            text = study_beacons(folder, known, bound_m, tell)
+        else:
+            text = study_target(folder, known, speed_m_s, bound_m, tell)
+        tell(text.rstrip())
+        tell(f"Figure and tables: {folder}")
+
+
+def _default(name: str) -> Path:
+    return Path("runs") / "studies" / name
