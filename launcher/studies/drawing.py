@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -39,8 +40,13 @@ def new_figure(width_in: float, height_in: float) -> Figure:
 
 
 def write_figure(figure: Figure, file: Path) -> Path:
-    """Write a figure as PNG with few colours' worth of bytes; the folder must exist."""
-    figure.savefig(file, dpi=DOTS_PER_IN, metadata={"Software": None})
+    """Write a figure as PNG of 96 colours, a third of the bytes of all; the folder must exist."""
+    from PIL import Image
+
+    full = io.BytesIO()
+    figure.savefig(full, format="png", dpi=DOTS_PER_IN)
+    with Image.open(full) as image:
+        image.convert("RGB").quantize(96, dither=Image.Dither.NONE).save(file, optimize=True)
     return file
 
 
