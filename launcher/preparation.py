@@ -15,10 +15,10 @@ from agents.casting import Casting
 from agents.leader import DeploymentPlanner
 from agents.mission import Behaviour, Mission, OnDemand, RosterEntry, Scripted, Wandering
 from launcher.ground import Ground, named, text_of
+from launcher.kernels import warm_up
 from launcher.scenario import Scenario, ScenarioFault, find_map, read_scenario
 from planning.deployment import NoChain
 from planning.environment import Environment
-from planning.warm_up import warm_up
 from protocol.messages import Point
 
 BASE = "base"

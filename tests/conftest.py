@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from hypothesis import settings
 
-from planning.warm_up import warm_up
+from launcher.kernels import warm_up
 
 # The same examples every time; a new one that fails is printed with what is needed to run it again.
 settings.register_profile("sightline", deadline=None, derandomize=True, print_blob=True)

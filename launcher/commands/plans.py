@@ -71,7 +71,7 @@ def _facts(name: str, environment: Environment) -> dict[str, Any]:
 
 
 def _describe_map(name: str, kind: Literal["inflection", "aspect"], picture: Path | None, as_json: bool) -> None:
-    from planning.warm_up import warm_up
+    from launcher.kernels import warm_up
 
     file = find_map(name, Path())
     _check_picture(picture)
@@ -147,8 +147,8 @@ def _plan(
     file = find_map(name, Path())
     _check_picture(picture)
     from launcher.ground import Ground
+    from launcher.kernels import warm_up
     from planning.environment import Environment
-    from planning.warm_up import warm_up
 
     warm_up(_say(as_json))
     environment = Environment.load(file, containing=base)

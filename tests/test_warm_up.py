@@ -1,0 +1,89 @@
+"""After warming up, nothing is compiled any more: seen from a process that does what peers and commands do."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import launcher.kernels
+
+COUNT = """
+import gc
+from numba.core.dispatcher import Dispatcher
+
+def compiled(package):
+    return {(d.py_func.__module__, d.py_func.__name__, str(s)) for d in gc.get_objects()
+            if isinstance(d, Dispatcher) and d.py_func.__module__.startswith(package) for s in d.overloads}
+"""
+
+PLANNING = """
+import numpy as np
+import maps
+from planning.environment import Environment
+from planning.geodesic import GeodesicMap
+from planning.connectivity import component_labels
+from planning.decomposition import decompose
+from planning.edge_weights import virtual_weights
+from planning.mutual_visibility import mutual_visibility
+from planning.placement import reachable_positions
+from planning.shortest_paths import all_pairs, from_source
+from agents.leader import DeploymentPlanner
+
+for name, kind in (("room1", "aspect"), ("room2", "aspect"), ("office", "inflection")):
+    environment = Environment.load(maps.path(name))
+    free = environment.inflated(0.2)
+    cells = decompose(environment, kind)
+    places = reachable_positions(cells, free)
+    places = places[~np.isnan(places[:, 0])]
+    component_labels(environment.visibility_matrix(places[:5]))
+    geodesics = GeodesicMap(free)
+    geodesics.path(places[0], places[1]); geodesics.lengths(places[0], places)
+    weights = virtual_weights(cells, mutual_visibility(cells))
+    all_pairs(weights); from_source(weights, 0)
+    base, agent = (tuple(map(float, places[i])) for i in (0, -1))
+    planner = DeploymentPlanner(environment, base, 0.2, kind)
+    robots = {f"robot_{i}": tuple(map(float, places[2 + i])) for i in range(8)}
+    plan = planner.plan(agent, (agent,), robots, None)
+    planner.plan(agent, (agent,), robots, plan)
+"""
+
+
+def test_real_use_compiles_nothing_after_the_warm_up() -> None:
+    code = f"""{COUNT}
+from planning.warm_up import exercise
+exercise()
+warm = compiled("planning.")
+assert warm, "no kernel was found"
+{PLANNING}
+cold = compiled("planning.") - warm
+assert not cold, cold
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_kernels_are_stamped_once_and_again_when_a_source_changes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    package = tmp_path / "sampled"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    (package / "warm_up.py").write_text(
+        "def exercise():\n    with open(__file__ + '.log', 'a') as log:\n        log.write('.')\n"
+    )
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(launcher.kernels, "PACKAGES", ("sampled",))
+    monkeypatch.setattr(launcher.kernels, "__file__", str(tmp_path / "launcher" / "kernels.py"))
+    said: list[str] = []
+    assert launcher.kernels.warm_up(said.append)
+    assert not launcher.kernels.warm_up(said.append)
+    (package / "__pycache__").mkdir(exist_ok=True)
+    stale = package / "__pycache__" / "kernel.1.nbc"
+    stale.touch()
+    (package / "another.py").write_text("changed = True\n")
+    assert launcher.kernels.warm_up(said.append)
+    assert (len(said), stale.exists()) == (2, False)
+    assert (package / "warm_up.py.log").read_text() == ".."
