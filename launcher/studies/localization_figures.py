@@ -141,7 +141,10 @@ def _draw_close_up(axes: Axes, scene: Scene, avoid: Floats, half: float) -> None
     reach = 0.6 * float((high - low).max())
     if reach > 0.25 * half:
         return
-    inside = (avoid - [axes.get_xlim()[0], axes.get_ylim()[0]]) / (2 * half)
+    box = np.array([(x, y) for x in (low[0], high[0]) for y in (low[1], high[1])])
+    inside = (np.vstack([avoid, np.repeat(box, len(avoid), axis=0)]) - [axes.get_xlim()[0], axes.get_ylim()[0]]) / (
+        2 * half
+    )
     corners = [(x, y) for x in (0.02, 0.6) for y in (0.02, 0.58)]
     hidden = [int(((inside >= place) & (inside <= np.add(place, 0.42))).all(axis=1).sum()) for place in corners]
     corner = axes.inset_axes((*corners[int(np.argmin(hidden))], 0.38, 0.38), zorder=9)
@@ -271,10 +274,10 @@ def snapshot_steps(run: Run, corrupt: bool) -> tuple[int, ...]:
     """Steps worth a snapshot: the first, the last with two regions, found, and around the flaw."""
     regions = [len(scene.feasible.regions) for scene in run.scenes]
     two = [step for step, count in enumerate(regions[:CORRUPT_STEP]) if count == 2]
-    split = two[len(two) // 2] if two else 2
+    split = max(2, two[len(two) // 2]) if two else 2
     if not corrupt:
-        return 0, split, 12, 30
-    return 0, split, CORRUPT_STEP - 1, CORRUPT_STEP, CORRUPT_STEP + 4, len(regions) - 1
+        return 0, min(split, 11), 12, 30
+    return 0, min(split, CORRUPT_STEP - 2), CORRUPT_STEP - 1, CORRUPT_STEP, CORRUPT_STEP + 4, len(regions) - 1
 
 
 def _rows(steps: NDArray[np.int_], table: Sequence[Floats]) -> list[tuple[float, ...]]:
