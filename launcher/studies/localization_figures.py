@@ -142,9 +142,8 @@ def _draw_close_up(axes: Axes, scene: Scene, avoid: Floats, half: float) -> None
     if reach > 0.25 * half:
         return
     box = np.array([(x, y) for x in (low[0], high[0]) for y in (low[1], high[1])])
-    inside = (np.vstack([avoid, np.repeat(box, len(avoid), axis=0)]) - [axes.get_xlim()[0], axes.get_ylim()[0]]) / (
-        2 * half
-    )
+    points = np.vstack([avoid, np.repeat(box, len(avoid), axis=0)])
+    inside = (points - [axes.get_xlim()[0], axes.get_ylim()[0]]) / (2 * half)
     corners = [(x, y) for x in (0.02, 0.6) for y in (0.02, 0.58)]
     hidden = [int(((inside >= place) & (inside <= np.add(place, 0.42))).all(axis=1).sum()) for place in corners]
     corner = axes.inset_axes((*corners[int(np.argmin(hidden))], 0.38, 0.38), zorder=9)
