@@ -52,7 +52,7 @@ class SimulatedPeer:
         self._shell = PeerShell(
             self._role,
             self._driver,
-            self._network.attach(self._name, self._take),
+            self._network.attach(self._name, self._take, kinds=self._role.hears),
             name=self._name,
             team=self._mission.team,
             incarnation=0,

@@ -16,7 +16,7 @@ Models: trio's MockClock; FoundationDB's simulation testing.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from heapq import heappop, heappush
 from random import Random
 from typing import Any
@@ -62,9 +62,12 @@ class VirtualTime:
 class SimulatedBus:
     """The connection of one peer (or one operator) to a simulated network. Made by :meth:`SimulatedNetwork.attach`."""
 
-    def __init__(self, network: SimulatedNetwork, peer: str, deliver: Deliver, operator: bool) -> None:
+    def __init__(
+        self, network: SimulatedNetwork, peer: str, deliver: Deliver, operator: bool, kinds: Collection[str] | None
+    ) -> None:
         self.peer = peer
         self.operator = operator
+        self.kinds = None if kinds is None else frozenset(kinds)
         self.dropped = 0
         """Publications that were not sent, because the bus was closed."""
         self._network = network
@@ -123,8 +126,16 @@ class SimulatedNetwork:
         self._attached: dict[str, SimulatedBus] = {}
         self._last_arrivals_s: dict[tuple[str, str], float] = {}
 
-    def attach(self, peer: str, deliver: Deliver, *, operator: bool = False) -> SimulatedBus:
+    def attach(
+        self, peer: str, deliver: Deliver, *, operator: bool = False, kinds: Collection[str] | None = None
+    ) -> SimulatedBus:
         """Open a bus. A peer's token is seen by all others, and it sees theirs; operators have no token.
+
+        Args:
+            peer: its name.
+            deliver: takes what arrives.
+            operator: whether it is an operator and no peer.
+            kinds: kinds of messages (last chunks of keys) that it listens to; None: all.
 
         Raises:
             ValueError: somebody of that name is attached already.
@@ -132,7 +143,7 @@ class SimulatedNetwork:
         name = f"operator/{peer}" if operator else peer
         if name in self._attached:
             raise ValueError(f"{name} is attached to the simulated network already: close its bus first")
-        bus = SimulatedBus(self, name, deliver, operator)
+        bus = SimulatedBus(self, name, deliver, operator, kinds)
         for other_name, other in self._attached.items():
             if not operator:
                 self._send(name, other, PeerAppeared(name))
@@ -149,8 +160,9 @@ class SimulatedNetwork:
 
     def _publish(self, sender: SimulatedBus, publication: Received) -> None:
         self.published += 1
+        kind = publication.key.rpartition("/")[2]
         for other in self._attached.values():
-            if other is sender:
+            if other is sender or (other.kinds is not None and kind not in other.kinds):
                 continue
             if self._loss and self._losses.random() < self._loss:
                 self.lost += 1

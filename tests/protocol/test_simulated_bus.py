@@ -232,6 +232,20 @@ def test_peers_appear_and_vanish_and_operators_do_not() -> None:
     assert heard["b"][-1] == PeerAppeared("a")
 
 
+def test_a_peer_hears_the_kinds_that_it_listens_to_and_who_comes_and_goes() -> None:
+    time = VirtualTime()
+    network = SimulatedNetwork(time, 0)
+    heard: list[BusEvent] = []
+    network.attach("a", heard.append, kinds={"deployment"})
+    speaker = network.attach("b", print)
+    for kind in ("state", "deployment", "heartbeat"):
+        speaker.publish(f"t/v1/b/{kind}", b"{}")
+    speaker.close()
+    time.run_until(1.0)
+    assert heard == [PeerAppeared("b"), Received("t/v1/b/deployment", b"{}"), PeerVanished("b")]
+    assert network.delivered == 1
+
+
 def test_impossible_networks_are_refused() -> None:
     time = VirtualTime()
     for delay_s in ((-1.0, 1.0), (2.0, 1.0), (0.0, math.inf), (math.nan, 1.0)):
