@@ -193,10 +193,10 @@ def ring(ax: float, ay: float, r0: float, r1: float, tolerance: float, out: Floa
 
 
 @kernel
-def part(P: Floats, n: int, Q: Floats, m: int, other: Floats) -> tuple[int, int]:
+def part(P: Floats, n: int, Q: Floats, m: int, other: Floats) -> tuple[int, int, bool]:
     """Part two overlapping pieces by a line that loses no point of either, in place.
 
-    Returns their numbers of vertices.
+    Returns their numbers of vertices, and whether there was such a line, or no need for one.
 
     Where two convex boundaries cross at two points, the line through these will do: what it takes from one lies in the
     other. That is checked, not trusted. A piece inside the other vanishes.
@@ -214,7 +214,7 @@ def part(P: Floats, n: int, Q: Floats, m: int, other: Floats) -> tuple[int, int]
         common = clip(both, common, nx, ny, nx * Q[i, 0] + ny * Q[i, 1] - 2.0 * convex_polygon.ROUNDING_M, spare)
         both[:common] = spare[:common]
         if common == 0:
-            return n, m
+            return n, m, True
     near = 1e-8
     x, y = np.empty(2 * SCRATCH), np.empty(2 * SCRATCH)
     ends = 0
@@ -223,9 +223,9 @@ def part(P: Floats, n: int, Q: Floats, m: int, other: Floats) -> tuple[int, int]
             x[ends], y[ends] = both[i, 0], both[i, 1]
             ends += 1
     if _inside(Q, m, P, n):
-        return n, 0
+        return n, 0, True
     if _inside(P, n, Q, m):
-        return 0, m
+        return 0, m, True
     for i in range(ends):
         for j in range(ends):
             ex, ey = x[j] - x[i], y[j] - y[i]
@@ -245,8 +245,8 @@ def part(P: Floats, n: int, Q: Floats, m: int, other: Floats) -> tuple[int, int]
             P[:n] = other[:n]
             m = clip(Q, m, -nx, -ny, -limit, other)
             Q[:m] = other[:m]
-            return n, m
-    return n, m
+            return n, m, True
+    return n, m, False
 
 
 @kernel
@@ -267,17 +267,27 @@ def grow(pieces: Floats, counts: Ints, distance: float, out: Floats, kept: Ints)
     """
     m = len(counts)
     grown, box = np.empty((m, SCRATCH, 2)), np.empty((m, 4))
-    other = np.empty((SCRATCH, 2))
+    other, joint = np.empty((SCRATCH, 2)), np.empty((3 * SCRATCH, 2))
     for i in range(m):
         kept[i] = convex_polygon.grow(pieces[i], counts[i], distance, grown[i])
         _bound(grown[i], kept[i], box[i])
-    for i in range(m):
-        for j in range(i):
-            if kept[i] == 0 or kept[j] == 0:
-                continue
-            if box[i, 0] > box[j, 2] or box[j, 0] > box[i, 2] or box[i, 1] > box[j, 3] or box[j, 1] > box[i, 3]:
-                continue
-            kept[i], kept[j] = part(grown[i], kept[i], grown[j], kept[j], other)
+    # A second round for what the hulls of the first one overlap.
+    for _ in range(2):
+        for i in range(m):
+            for j in range(i):
+                if kept[i] == 0 or kept[j] == 0:
+                    continue
+                if box[i, 0] > box[j, 2] or box[j, 0] > box[i, 2] or box[i, 1] > box[j, 3] or box[j, 1] > box[i, 3]:
+                    continue
+                kept[i], kept[j], parted = part(grown[i], kept[i], grown[j], kept[j], other)
+                if parted:
+                    continue
+                n = simplify(joint, hull(grown[i], kept[i], grown[j], kept[j], joint), MOST_VERTICES)
+                # An overlap costs area over and over again, a hull once.
+                if area(joint, n) <= 1.1 * max(area(grown[i], kept[i]), area(grown[j], kept[j])):
+                    grown[j, :n] = joint[:n]
+                    kept[i], kept[j] = 0, n
+                    _bound(joint, n, box[j])
     k = 0
     for i in range(m):
         n = simplify(grown[i], kept[i], MOST_VERTICES)

@@ -181,7 +181,8 @@ def _normal(P: Floats, n: int, i: int) -> float:
 @kernel
 def _near(p: Floats, q: Floats, distance: float) -> bool:
     """Whether no coordinate differs by more than a distance."""
-    return max(abs(p[0] - q[0]), abs(p[1] - q[1])) <= distance
+    near: bool = max(abs(p[0] - q[0]), abs(p[1] - q[1])) <= distance
+    return near
 
 
 @kernel

@@ -32,8 +32,14 @@ Ints = NDArray[np.int64]
 LINES = 65
 """First lines of the sweep, evenly spaced."""
 
+RESOLUTION = 1e-11
+"""How close lines are looked at, in units of the ellipsoid: finer, rounding lets roots come and go at random."""
+
+NARROWEST = 1e-9
+"""Events nearer to each other than this count as one."""
+
 Panel = tuple[Floats, Floats]
-"""Lines (m,) and the roots on them (m, 2 or 4), constant in number."""
+"""Lines (m,) and the roots on them (m, 0, 2 or 4), constant in number."""
 
 
 class NormalForm(NamedTuple):
@@ -73,7 +79,7 @@ def roots_on_lines(h: Floats, lines: Floats) -> tuple[Ints, Floats]:
 
 @kernel
 def find_events(h: Floats, lines: Floats) -> Floats:
-    """Events (k, 2) between lines (m,), ascending: the last line before each and the first after it, next to equal.
+    """Events (k, 2) between lines (m,), ascending: the last line before each and the first after it, nearly equal.
 
     Also where the number of intervals stays the same but they do not overlap: one ends before the other begins.
     """
@@ -94,7 +100,7 @@ def find_events(h: Floats, lines: Floats) -> Floats:
             for j in range(0, n if alike else 0, 2):
                 alike = alike and max(p[j], roots[top, j]) <= min(p[j + 1], roots[top, j + 1])
             middle = 0.5 * (left + at[top])
-            close = at[top] - left < 1e-15 or not left < middle < at[top]
+            close = at[top] - left < RESOLUTION
             if alike or close:
                 if not alike and k < most:
                     events[k] = left, at[top]
@@ -167,7 +173,9 @@ def first_lines(form: NormalForm) -> Floats:
 
 
 def sweep(form: NormalForm, nodes: int, lines: Floats) -> tuple[list[Panel], Floats]:
-    """Panels with nodes + 1 lines each, ascending in w₂, and lines (m,) that find them at once the next time.
+    """Panels with nodes + 1 lines each, ascending in w₂ from one end of the set to the other; none if it is empty.
+
+    Returns also lines (m,) that find them at once the next time.
 
     Args:
         form: the set.
@@ -178,18 +186,22 @@ def sweep(form: NormalForm, nodes: int, lines: Floats) -> tuple[list[Panel], Flo
     spread = 0.5 * (1.0 - np.cos(np.linspace(0.0, math.pi, nodes + 1)))
     panels: list[Panel] = []
     for _ in range(6):
-        events = find_events(h, lines)
+        events: list[list[float]] = []
+        for first, last in find_events(h, lines).tolist():
+            if events and first - events[-1][1] < NARROWEST:
+                events[-1][1] = last
+            else:
+                events.append([first, last])
         panels, surprises = [], []
-        for (_, first), (last, _) in pairwise(events.tolist()):
+        for (_, first), (last, _) in pairwise(events):
             on = first + (last - first) * spread
             on[-1] = last
             counts, roots = roots_on_lines(h, on)
             if (counts != counts[0]).any():
                 surprises.append(on)
-            elif counts[0]:
-                panels.append((on, roots[:, : counts[0]]))
+            panels.append((on, roots[:, : counts[0]]))
         # The ends of events need no bisection again.
-        lines = np.unique(np.concatenate([[-1.0, 1.0], events.ravel(), *(on for on, _ in panels), *surprises]))
+        lines = np.unique(np.concatenate([[-1.0, 1.0], np.ravel(events), *(on for on, _ in panels), *surprises]))
         if not surprises:
             break
         # Something came and went between two first lines: look again with the lines that saw it.
@@ -216,6 +228,8 @@ def extents(lines: Floats, roots: Floats, M: Floats) -> tuple[float, float]:
 def _join(before: Floats, after: Floats) -> tuple[list[tuple[int, int]], list[tuple[int, int]], list[tuple[int, int]]]:
     """Which roots go on over an event (old, new), which die in pairs (old, old) and which are born (new, new)."""
     n, m = len(before), len(after)
+    if n == m and (np.maximum(before[::2], after[::2]) <= np.minimum(before[1::2], after[1::2])).all():
+        return [(i, i) for i in range(n)], [], []
     if abs(n - m) != 2:
         return [], [(i, i + 1) for i in range(0, n, 2)], [(i, i + 1) for i in range(0, m, 2)]
     small, large = (before, after) if n < m else (after, before)
@@ -234,20 +248,16 @@ def trace(panels: list[Panel]) -> list[Floats]:
         links[one], links[other] = other, one
 
     # An end of a piece of boundary: (panel, root, whether it is the upper end).
-    for p, (lines, roots) in enumerate(panels):
-        behind = p > 0 and lines[0] - panels[p - 1][0][-1] < 4e-15
-        before = panels[p - 1][1][-1] if behind else np.empty(0)
-        through, dying, born = _join(before, roots[0])
+    for p in range(len(panels) + 1):
+        before = panels[p - 1][1][-1] if p else np.empty(0)
+        after = panels[p][1][0] if p < len(panels) else np.empty(0)
+        through, dying, born = _join(before, after)
         for old, new in through:
             link((p - 1, old, True), (p, new, False))
         for i, j in dying:
             link((p - 1, i, True), (p - 1, j, True))
         for i, j in born:
             link((p, i, False), (p, j, False))
-        ahead = p + 1 < len(panels) and panels[p + 1][0][0] - lines[-1] < 4e-15
-        if not ahead:
-            for i in range(0, roots.shape[1], 2):
-                link((p, i, True), (p, i + 1, True))
     loops: list[Floats] = []
     left = {(p, i) for p, (_, roots) in enumerate(panels) for i in range(roots.shape[1])}
     while left:

@@ -223,7 +223,8 @@ class TightSet:
     def centroid(self) -> Floats:
         """(2,) float, metres, map frame. Raises NothingMeasured before the first range."""
         total = self._moments
-        return total[1:3] / total[0] + np.asarray(self._origin)
+        centroid: Floats = total[1:3] / total[0] + np.asarray(self._origin)
+        return centroid
 
     @property
     def covariance(self) -> Floats:

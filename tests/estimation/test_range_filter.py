@@ -61,15 +61,16 @@ def test_the_first_ellipsoid_touches_both_edges_of_the_annulus_and_is_minimal(r0
     assert reach[0] == pytest.approx(1.0, abs=1e-6) or r0 == 0.0
 
     # Independent: axis-symmetric ellipsoids around both edges, by their centre's height.
-    def log_volume(height: float) -> float:
+    def log_volume(log_rise: float) -> float:
         t0, t1 = r0**2, r1**2
-        # u/a² + (τ − h)²/b² = 1 at both edges, with u = τ: two linear equations in 1/a², 1/b².
+        height = (t0 + t1) / 2 + math.exp(log_rise)
+        # τ/a² + (τ − height)²/b² = 1 at both edges τ = r²: two linear equations in 1/a², 1/b².
         x = np.linalg.solve([[t0, (t0 - height) ** 2], [t1, (t1 - height) ** 2]], [1.0, 1.0])
         return float(-np.log(x[0]) - 0.5 * np.log(x[1])) if (x > 0).all() else math.inf
 
     if r0 > 0.0:
-        middle, half = (r0**2 + r1**2) / 2, (r1**2 - r0**2) / 2
-        best = minimize_scalar(log_volume, bounds=(middle, middle + half), method="bounded", options={"xatol": 1e-12})
+        top = math.log((r1**2 - r0**2) / 2)
+        best = minimize_scalar(log_volume, bounds=(top - 12.0, top), method="bounded", options={"xatol": 1e-9})
         mine = math.log(range_cut.volume(state) / (4 / 3 * math.pi))
         assert mine == pytest.approx(best.fun, abs=1e-6)
 
