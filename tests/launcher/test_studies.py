@@ -14,7 +14,7 @@ from launcher.cli import app
 from launcher.studies import drawing, localization
 from launcher.studies.localization import BadStudy, study_localization
 from launcher.studies.range_data import BadData, read_range_data
-from launcher.studies.ranges import find_beacons, find_target, measure_polygons
+from launcher.studies.range_findings import find_beacons, find_target, measure_polygons
 from launcher.studies.ranging_run import CORRUPT_STEP, EXPERIMENTS, LAWS, STRAIGHT, run_experiment
 
 SHARED = Path(os.environ.get("SIGHTLINE_DATA", Path(__file__).parents[3] / "shared"))
