@@ -151,6 +151,8 @@ def _stationary_weight(g: float, nu: float, rank: int) -> float:
 
     def logarithm_of_determinant(at: float) -> float:
         beta = g + b * at
+        if beta == 0.0:  # at λ = 0 for a direction that the set does not bound in floating point
+            return -math.inf
         k = abs((g + c * at + square * at * at) / beta)
         shares: float = abs(beta) * at ** (rank - 1)
         return math.log(shares) - rank * math.log(k) if shares > 0 and k > 0 else -math.inf

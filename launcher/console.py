@@ -19,7 +19,7 @@ err = Console(stderr=True)
 BAD_INPUT = 2
 """Exit status when what was asked for cannot be done as asked."""
 
-_OURS = {"agents", "launcher", "maps", "planning", "protocol"}
+_OURS = {"agents", "estimation", "launcher", "maps", "planning", "protocol"}
 
 
 @contextlib.contextmanager

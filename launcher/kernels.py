@@ -11,23 +11,27 @@ from __future__ import annotations
 import hashlib
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from pathlib import Path
 
-PACKAGES: tuple[str, ...] = ("planning",)
+PACKAGES: tuple[str, ...] = ("planning", "estimation")
 """Packages with kernels; each has a module ``warm_up`` whose ``exercise`` runs them all."""
 
 
-def warm_up(announce: Callable[[str], None] = lambda _: None) -> bool:
+def warm_up(announce: Callable[[str], None] = lambda _: None, packages: Sequence[str] = ()) -> bool:
     """Compile every kernel unless that has been done; say so through ``announce`` beforehand.
 
     To be called before the first kernel of the process: what it has loaded it keeps.
 
+    Args:
+        announce: is told before anything that takes long.
+        packages: those that are needed; all if empty.
+
     Returns:
         Whether anything had to be compiled.
     """
-    stale = [package for package in PACKAGES if not _stamp(package).exists()]
+    stale = [package for package in packages or PACKAGES if not _stamp(package).exists()]
     if stale:
         announce("Compiling the numerical kernels (once for this version; a minute or two) ...")
     for package in stale:

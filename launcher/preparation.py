@@ -56,7 +56,7 @@ def prepare(file: Path, announce: Callable[[str], None]) -> Preparation:
     """
     scenario = read_scenario(file)
     map_file = find_map(scenario.map, file.parent, f"{file}: map: ")
-    warm_up(announce)
+    warm_up(announce, ["planning"])
     environment = Environment.load(map_file, containing=scenario.base.position)
     ground = Ground(file, environment)
     ground.check_inside("base.position", scenario.base.position)

@@ -51,14 +51,23 @@ for name, kind in (("room1", "aspect"), ("room2", "aspect"), ("office", "inflect
 """
 
 
-def test_real_use_compiles_nothing_after_the_warm_up() -> None:
+ESTIMATION = """
+from launcher.studies.ranging_run import EXPERIMENTS, LAWS, run_experiment
+
+for law in LAWS:
+    run_experiment(EXPERIMENTS[-1], law, 1)
+"""
+
+
+@pytest.mark.parametrize(("package", "use"), [("planning", PLANNING), ("estimation", ESTIMATION)])
+def test_real_use_compiles_nothing_after_the_warm_up(package: str, use: str) -> None:
     code = f"""{COUNT}
-from planning.warm_up import exercise
+from {package}.warm_up import exercise
 exercise()
-warm = compiled("planning.")
+warm = compiled("{package}.")
 assert warm, "no kernel was found"
-{PLANNING}
-cold = compiled("planning.") - warm
+{use}
+cold = compiled("{package}.") - warm
 assert not cold, cold
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)

@@ -78,7 +78,7 @@ def _describe_map(name: str, kind: Literal["inflection", "aspect"], picture: Pat
     from planning.environment import Environment
 
     environment = Environment.load(file)
-    warm_up(_say(as_json))
+    warm_up(_say(as_json), ["planning"])
     from planning.decomposition import decompose
 
     with busy("Decomposing ..."):
@@ -150,7 +150,7 @@ def _plan(
     from launcher.kernels import warm_up
     from planning.environment import Environment
 
-    warm_up(_say(as_json))
+    warm_up(_say(as_json), ["planning"])
     environment = Environment.load(file, containing=base)
     ground = Ground(file, environment)
     ground.check_inside("--base", base)

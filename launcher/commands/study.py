@@ -21,8 +21,10 @@ def localization(
 ) -> None:
     """Robots find a target by ranges and choose where to go: thesis chapter 2, figures 10 and 12 to 18."""
     with plainly():
+        from launcher.kernels import warm_up
         from launcher.studies.localization import study_localization
 
+        warm_up(tell, ["estimation"])
         folder = output or _default("localization")
         # Before the work: a folder that cannot be made costs no time.
         folder.mkdir(parents=True, exist_ok=True)
@@ -47,9 +49,11 @@ def ranges(
 ) -> None:
     """Localise the beacons, or the moving node, of a data set from its ranges alone."""
     with plainly():
+        from launcher.kernels import warm_up
         from launcher.studies.range_data import read_range_data
         from launcher.studies.ranges import study_beacons, study_target
 
+        warm_up(tell, ["estimation"])
         folder = output or _default(f"ranges-{data.resolve().name}-{find}")
         known = read_range_data(data)
         if find == "beacons":

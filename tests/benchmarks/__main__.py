@@ -23,9 +23,10 @@ Case = tuple[str, float, Callable[[], object]]
 
 def cases() -> Iterator[Case]:
     """All benchmark cases: name, target in seconds, what to time."""
-    from tests.benchmarks import planning_benchmarks, process_benchmarks
+    from tests.benchmarks import estimation_benchmarks, planning_benchmarks, process_benchmarks
 
     yield from planning_benchmarks.cases()
+    yield from estimation_benchmarks.cases()
     yield from process_benchmarks.cases()
 
 

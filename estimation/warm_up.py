@@ -1,0 +1,38 @@
+"""Every kernel of the package, run once with the argument types of real use, so that all are compiled."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def exercise() -> None:
+    """Find a target that moves, by ranges from three places, with every set and law."""
+    from estimation.ellipsoid import Ellipsoid
+    from estimation.fusion import fuse
+    from estimation.look_ahead import Limits, look_ahead
+    from estimation.range_filter import RangeFilter
+    from estimation.spread import spread_points
+    from estimation.strip import Strip
+    from estimation.strip_cut import cut
+    from estimation.thesis_filter import ThesisRangeFilter
+    from estimation.tight_set import TightSet
+
+    anchors = ((0.0, 0.0), (4.0, 0.0), (0.0, 3.0))
+    target = np.array([2.0, 1.5])
+    ellipsoids, tight, thesis = RangeFilter(), TightSet(), ThesisRangeFilter()
+    for anchor in anchors:
+        range_m = float(np.hypot(*(target - anchor)))
+        for estimate in (ellipsoids, tight, thesis):
+            estimate.measure(anchor, range_m, 0.1)
+        ellipsoids.predict(0.1)
+        tight.predict(0.1)
+        for region in (ellipsoids.feasible_set(), tight):
+            region.contains(target[None])
+            region.farthest_point(target)
+            _ = region.area_m2, region.centroid, region.covariance
+        _ = ellipsoids.feasible_set().regions
+    points = spread_points(tight.polygons, 8)
+    look_ahead(points, (1.0, 1.0), Limits(step_m=0.5, bound_m=0.1), steps=2)
+    ball = Ellipsoid.ball(np.zeros(3), 1.0)
+    fuse(ball, Ellipsoid.ball(np.full(3, 0.5), 1.0))
+    cut(ball, Strip(np.array([1.0, 0.0, 0.0]), -0.5, 0.5))
