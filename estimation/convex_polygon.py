@@ -155,14 +155,17 @@ def grow(P: Floats, n: int, distance: float, out: Floats) -> int:
     # turn one way only, and once around, whatever rounding says; else neighbours would disagree about a corner.
     around = 2.0 * math.pi
     begin = _normal(V, count, count - 1) if count > 1 else 0.0
-    before = begin
+    normal = begin
+    before = math.floor(begin / step)
+    last = before + DISC_SIDES
     m = 0
     for i in range(count):
-        after = begin + around
+        after = last
         if i < count - 1:
-            turn = (_normal(V, count, i) - before) % around
-            after = min(after, before + (turn if turn < 1.25 * math.pi else 0.0))
-        for k in range(math.floor(before / step), math.floor(after / step) + 1):
+            turn = (_normal(V, count, i) - normal) % around
+            normal = min(begin + around, normal + (turn if turn < 1.25 * math.pi else 0.0))
+            after = min(last, math.floor(normal / step))
+        for k in range(before, after + 1):
             angle = (k + 0.5) * step
             out[m, 0] = V[i, 0] + corner * math.cos(angle)
             out[m, 1] = V[i, 1] + corner * math.sin(angle)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from estimation.fusion import PADDING
 from estimation.kernel import kernel
+from estimation.minkowski_sum import enlarge
 from estimation.strip_cut import EMPTY, REDUNDANT, THINNEST, cut_factor
 
 Floats = NDArray[np.float64]
@@ -114,12 +115,11 @@ def cut(state: Floats, ax: float, ay: float, low: float, high: float) -> tuple[i
         return REDUNDANT, 1.0, 0.0
     # λ from the cut's semi-axes: with E₂ = d⁻² u uᵀ for the strip, 1/q = 1 + d⁻² (1 − λ)/λ.
     d = max(0.5 * (min(last, 1.0) - max(first, -1.0)), THINNEST)
-    u = factor.T @ direction
-    reach = math.sqrt(np.dot(u, u))
-    before = 0.0
+    reach, before = 0.0, 0.0
     for j in range(3):
+        reach += (direction[0] * factor[0, j] + direction[1] * factor[1, j] + factor[2, j]) ** 2
         before += (direction[0] * state[5 + j] + direction[1] * state[8 + j] + state[11 + j]) ** 2
-    along = reach / math.sqrt(before)
+    along = math.sqrt(reach / before)
     across = math.sqrt(ratio / along)
     q = min(1.0, (along / across) ** 2)
     weight = q / (q + d * d * (1.0 - q))
@@ -167,7 +167,9 @@ def tighten(state: Floats) -> tuple[bool, float]:
     raw = np.empty(3)
     for j in range(3):
         raw[j] = L[0, j] * state[2] + L[1, j] * state[3] - 0.5 * L[2, j]
-    g = V.T @ raw
+    g = np.empty(3)
+    for j in range(3):
+        g[j] = V[0, j] * raw[0] + V[1, j] * raw[1] + V[2, j] * raw[2]
     e1, e2 = e[0], e[1]
     low, high = -12.0, 30.0
     for _ in range(48):
@@ -185,12 +187,13 @@ def tighten(state: Floats) -> tuple[bool, float]:
     s = np.array([1.0 + mu * e1, 1.0 + mu * e2, 1.0])
     if 1.5 * math.log(k) - 0.5 * (math.log(s[0]) + math.log(s[1])) > -1e-9:
         return False, 0.0
-    turned = L @ V
     grown = math.sqrt(k) * (1.0 + PADDING)
     for i in range(3):
+        x, y, z = L[i, 0], L[i, 1], L[i, 2]
         for j in range(3):
-            state[2 + i] -= mu * turned[i, j] * g[j] / s[j]
-            state[5 + 3 * i + j] = grown * turned[i, j] / math.sqrt(s[j])
+            turned = x * V[0, j] + y * V[1, j] + z * V[2, j]
+            state[2 + i] -= mu * turned * g[j] / s[j]
+            L[i, j] = grown * turned / math.sqrt(s[j])
     recentre(state)
     return False, mu
 
@@ -248,63 +251,5 @@ def grow(state: Floats, distance: float) -> None:
     down, up = -(2.0 * rho - t) * t, (2.0 * rho + distance) * distance
     state[4] += 0.5 * (down + up)
     D = np.array([math.sqrt(1.5) * distance, math.sqrt(1.5) * distance, math.sqrt(3.0) * 0.5 * (up - down)])
-    p = _summing_parameter(np.linalg.inv(L) * D)
-    stacked = np.zeros((6, 3))
-    for i in range(3):
-        for j in range(3):
-            stacked[j, i] = math.sqrt(1.0 + 1.0 / p) * L[i, j]
-        stacked[3 + i, i] = math.sqrt(1.0 + p) * D[i]
-    _triangularise(stacked)
-    for i in range(3):
-        for j in range(3):
-            state[5 + 3 * i + j] = (1.0 + PADDING) * stacked[j, i] if j <= i else 0.0
+    enlarge(L, D)
     tighten(state)
-
-
-@kernel
-def _summing_parameter(A: Floats) -> float:
-    """The p of least volume; λᵢ are the eigenvalues of A Aᵀ, A = L⁻¹ D.
-
-    With the symmetric functions E₁, E₂, E₃ of λ, sums of squared minors of A, the condition reads
-    3E₃p⁴ + 2E₂p³ + (E₁ − E₂)p² − 2E₁p − 3 = 0: one change of sign, so one positive root.
-    """
-    E1 = np.sum(A * A)
-    E2 = 0.0
-    for i in range(3):
-        for j in range(3):
-            a, b, c, d = (i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3
-            E2 += (A[a, c] * A[b, d] - A[a, d] * A[b, c]) ** 2
-    E3 = np.linalg.det(A) ** 2
-    low, high = -60.0, 60.0
-    for _ in range(52):
-        middle = 0.5 * (low + high)
-        p = math.exp(middle)
-        if (((3.0 * E3 * p + 2.0 * E2) * p + E1 - E2) * p - 2.0 * E1) * p > 3.0:
-            high = middle
-        else:
-            low = middle
-    return math.exp(0.5 * (low + high))
-
-
-@kernel
-def _triangularise(A: Floats) -> None:
-    """Householder QR of (m, n) in place: R above the diagonal, zeros below. Stable column by column."""
-    m, n = A.shape
-    v = np.empty(m)
-    for k in range(n):
-        length = 0.0
-        for i in range(k, m):
-            v[i] = A[i, k]
-            length += v[i] * v[i]
-        length = math.sqrt(length)
-        v[k] += length if v[k] >= 0.0 else -length
-        square = 0.0
-        for i in range(k, m):
-            square += v[i] * v[i]
-        for j in range(k, n):
-            along = 0.0
-            for i in range(k, m):
-                along += v[i] * A[i, j]
-            along *= 2.0 / square
-            for i in range(k, m):
-                A[i, j] -= along * v[i]

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from estimation import convex_pieces
+from estimation import convex_growth, convex_pieces
 from estimation.convex_pieces import MOST_PIECES, MOST_VERTICES
 from estimation.outlier_rule import Outliers, make_rule
 from estimation.range_measurement import (
@@ -132,7 +132,7 @@ class _Polygons:
         return _Union(pieces, counts, area, (), math.sqrt(area))
 
     def grow(self, held: _Union, distance_m: float) -> _Union:
-        m = convex_pieces.grow(held.pieces, held.counts, distance_m, self._out, self._kept)
+        m = convex_growth.grow(held.pieces, held.counts, distance_m, self._out, self._kept)
         remembered = tuple(
             Annulus(x, y, max(0.0, inner - distance_m), outer + distance_m) for x, y, inner, outer in held.remembered
         )

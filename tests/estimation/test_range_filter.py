@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
-from estimation import range_cut
+from estimation import minkowski_sum, range_cut
 from estimation.outlier_rule import Relaxation
 from estimation.range_filter import RangeFilter
 from estimation.range_measurement import BadRange, NothingMeasured
@@ -133,6 +133,18 @@ def test_prediction_contains_every_move() -> None:
         grown = state.copy()
         range_cut.grow(grown, distance)
         assert (on_paraboloid(moved - grown[:2], grown) <= 1.0 + 1e-9).all(), seed
+
+
+def test_the_summing_parameter_is_the_best_one() -> None:
+    rng = np.random.default_rng(12)
+    for seed in range(40):
+        L, D = rng.normal(size=(3, 3)), 10.0 ** rng.uniform(-3.0, 2.0, 3)
+
+        def log_volume(p: float, L: np.ndarray = L, D: np.ndarray = D) -> float:
+            return float(np.linalg.slogdet((1 + 1 / p) * L @ L.T + (1 + p) * np.diag(D**2))[1])
+
+        p = minkowski_sum.summing_parameter(L, D)
+        assert log_volume(p) <= min(log_volume(0.99 * p), log_volume(1.01 * p)) + 1e-9, seed
 
 
 def test_reports() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
-from estimation import convex_pieces, convex_polygon
+from estimation import convex_growth, convex_pieces, convex_polygon
 from estimation.range_measurement import BadRange, NothingMeasured
 from estimation.tight_set import TightSet
 from tests.estimation.range_runs import Run, varied_runs
@@ -115,6 +115,11 @@ def test_polygon_kernels_against_shapely() -> None:
         grown = shapely.Polygon(out[:n])
         assert grown.is_valid and one.buffer(0.3, quad_segs=64).difference(grown.buffer(1e-9)).area < 1e-9, seed
         assert one.buffer(0.3 * 1.03, quad_segs=64).buffer(1e-6).contains(grown), seed
+        # Grown again, its sides are parallel to those of the disc, up to rounding.
+        again = np.zeros_like(out)
+        twice = shapely.Polygon(again[: convex_polygon.grow(out, n, 0.2, again)])
+        assert twice.is_valid and grown.buffer(0.2, quad_segs=64).difference(twice.buffer(1e-9)).area < 1e-9, seed
+        assert twice.convex_hull.area == pytest.approx(twice.area, rel=1e-9), seed
         simple = p.copy()
         n = convex_polygon.simplify(simple, len(P), 5)
         assert n <= max(5, 3), seed
@@ -137,7 +142,7 @@ def test_parting_loses_nothing() -> None:
             sizes.append(convex_polygon.grow(half, n, 0.2, grown))
             halves.append(grown)
         before = shapely.union_all([shapely.Polygon(h[:n]) for h, n in zip(halves, sizes, strict=True)])
-        n, m, done = convex_pieces.part(halves[0], sizes[0], halves[1], sizes[1], np.zeros((convex_pieces.SCRATCH, 2)))
+        n, m, done = convex_growth.part(halves[0], sizes[0], halves[1], sizes[1], np.zeros((convex_pieces.SCRATCH, 2)))
         after = [shapely.Polygon(h[:k]) for h, k in zip(halves, (n, m), strict=True) if k]
         assert before.difference(shapely.union_all(after).buffer(1e-8)).area < 1e-9, seed
         if done:

@@ -1,0 +1,136 @@
+"""Kernels that grow a union of convex polygons by a distance, and part what overlaps then.
+
+Areas are sums over the pieces (`estimation.convex_pieces`), so overlaps would count twice, more with every step.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation import convex_polygon
+from estimation.convex_pieces import MOST_VERTICES, SCRATCH
+from estimation.convex_polygon import area, clip, depth, hull, simplify
+from estimation.kernel import kernel
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@kernel
+def part(P: Floats, n: int, Q: Floats, m: int, other: Floats) -> tuple[int, int, bool]:
+    """Part two overlapping pieces by a line that loses no point of either, in place.
+
+    Returns their numbers of vertices, and whether there was such a line, or no need for one.
+
+    Where two convex boundaries cross at two points, the line through these will do: what it takes from one lies in the
+    other. That is checked, not trusted. A piece inside the other vanishes.
+    """
+    both, spare = np.empty((2 * SCRATCH, 2)), np.empty((2 * SCRATCH, 2))
+    common = n
+    both[:n] = P[:n]
+    for i in range(m):
+        j = i + 1 if i + 1 < m else 0
+        ex, ey = Q[j, 0] - Q[i, 0], Q[j, 1] - Q[i, 1]
+        length = math.sqrt(ex * ex + ey * ey)
+        if length == 0.0:
+            continue
+        nx, ny = ey / length, -ex / length
+        common = clip(both, common, nx, ny, nx * Q[i, 0] + ny * Q[i, 1] - 2.0 * convex_polygon.ROUNDING_M, spare)
+        both[:common] = spare[:common]
+        if common == 0:
+            return n, m, True
+    near = 1e-8
+    x, y = np.empty(2 * SCRATCH), np.empty(2 * SCRATCH)
+    ends = 0
+    for i in range(common):
+        if depth(P, n, both[i, 0], both[i, 1]) < near and depth(Q, m, both[i, 0], both[i, 1]) < near:
+            x[ends], y[ends] = both[i, 0], both[i, 1]
+            ends += 1
+    if _inside(Q, m, P, n):
+        return n, 0, True
+    if _inside(P, n, Q, m):
+        return 0, m, True
+    for i in range(ends):
+        for j in range(ends):
+            ex, ey = x[j] - x[i], y[j] - y[i]
+            length = math.sqrt(ex * ex + ey * ey)
+            if length < 10.0 * near:
+                continue
+            # P keeps the left of the line from i to j, Q the right.
+            nx, ny = ey / length, -ex / length
+            limit = nx * x[i] + ny * y[i]
+            k = clip(P, n, -nx, -ny, -limit, other)
+            if not _inside(other, k, Q, m):
+                continue
+            k = clip(Q, m, nx, ny, limit, other)
+            if not _inside(other, k, P, n):
+                continue
+            n = clip(P, n, nx, ny, limit, other)
+            P[:n] = other[:n]
+            m = clip(Q, m, -nx, -ny, -limit, other)
+            Q[:m] = other[:m]
+            return n, m, True
+    return n, m, False
+
+
+@kernel
+def _inside(P: Floats, n: int, Q: Floats, m: int) -> bool:
+    """Whether a polygon lies in another, to within rounding."""
+    for i in range(n):  # noqa: SIM110
+        if depth(Q, m, P[i, 0], P[i, 1]) < -4.0 * convex_polygon.ROUNDING_M:
+            return False
+    return True
+
+
+@kernel
+def grow(pieces: Floats, counts: Ints, distance: float, out: Floats, kept: Ints) -> int:
+    """Write an outer bound of all points within a distance of a set into out and kept; the number of pieces.
+
+    All pieces grow by the same polygon, and then overlap. The boundaries of two convex sets that were apart and grew by
+    the same convex set cross at no more than two points, so they can be parted again.
+    """
+    m = len(counts)
+    grown, box = np.empty((m, SCRATCH, 2)), np.empty((m, 4))
+    other, joint = np.empty((SCRATCH, 2)), np.empty((3 * SCRATCH, 2))
+    for i in range(m):
+        kept[i] = convex_polygon.grow(pieces[i], counts[i], distance, grown[i])
+        _bound(grown[i], kept[i], box[i])
+    # A second round for what the hulls of the first one overlap.
+    for _ in range(2):
+        for i in range(m):
+            for j in range(i):
+                if kept[i] == 0 or kept[j] == 0:
+                    continue
+                if box[i, 0] > box[j, 2] or box[j, 0] > box[i, 2] or box[i, 1] > box[j, 3] or box[j, 1] > box[i, 3]:
+                    continue
+                kept[i], kept[j], parted = part(grown[i], kept[i], grown[j], kept[j], other)
+                if parted:
+                    continue
+                n = simplify(joint, hull(grown[i], kept[i], grown[j], kept[j], joint), MOST_VERTICES)
+                # An overlap costs area over and over again, a hull once.
+                if area(joint, n) <= 1.1 * max(area(grown[i], kept[i]), area(grown[j], kept[j])):
+                    grown[j, :n] = joint[:n]
+                    kept[i], kept[j] = 0, n
+                    _bound(joint, n, box[j])
+    k = 0
+    for i in range(m):
+        n = simplify(grown[i], kept[i], MOST_VERTICES)
+        if n:
+            out[k, :n] = grown[i, :n]
+            kept[k] = n
+            k += 1
+    return k
+
+
+@kernel
+def _bound(P: Floats, n: int, box: Floats) -> None:
+    """Write the bounding box of a polygon: least x, least y, greatest x, greatest y."""
+    box[:2] = np.inf
+    box[2:] = -np.inf
+    for i in range(n):
+        for axis in range(2):
+            box[axis] = min(box[axis], P[i, axis])
+            box[axis + 2] = max(box[axis + 2], P[i, axis])
