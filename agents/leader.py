@@ -59,7 +59,6 @@ MOST_CELLS: Final = 6000
 """More cells take too much memory, and minutes of preparation."""
 
 
-
 class TooManyCells(ValueError):
     """The decomposition of this map is too fine to plan on; the text says how fine, and the remedy."""
 
