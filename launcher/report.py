@@ -288,7 +288,7 @@ def render(metrics: Metrics) -> Group:
         ("duration", f"{metrics.duration_s:.1f} s"),
         (
             "first deployment",
-            "none" if metrics.first_deployment_s is None else f"at {metrics.first_deployment_s:.2f} s",
+            "none" if metrics.first_deployment_s is None else f"at {metrics.first_deployment_s:.2f} s of mission time",
         ),
         (
             "robots used as relays",
@@ -311,9 +311,9 @@ def render(metrics: Metrics) -> Group:
         (
             "overlapping discs",
             f"{sum(overlap.episodes for overlap in metrics.overlaps)} times, {overlapping_s:.1f} s in all, "
-            f"{len(metrics.overlaps)} pairs",
+            f"{len(metrics.overlaps)} pairs (not avoided yet)",
         ),
-        ("log", f"{metrics.warnings} warnings, {metrics.errors} errors"),
+        ("log", f"{metrics.warnings} warnings, {metrics.errors} errors, in the recording and in logs/"),
     ):
         figures.add_row(title, value)
     parts: list[Table] = [shares, figures]

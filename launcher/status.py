@@ -21,13 +21,13 @@ _COLOURS = {
 
 def describe(status: Status, now_s: float) -> str:
     """The team in one line."""
+    up = f"{now_s:6.1f} s  {status.up}/{len(status.peers)} up"
+    if status.deployment is None:
+        return f"{up}, starting"
     chain = "chain connected" if status.chain_connected else "chain broken"
     sight = "" if status.chain_connected else ", agent visible" if status.agent_visible else ", agent out of sight"
     goal = f", agent to {_place(status.goal)}" if status.goal else ""
-    return (
-        f"{now_s:6.1f} s  {status.up}/{len(status.peers)} up, {chain}{sight}, "
-        f"{status.relays} relays, {status.links} lines of sight{goal}"
-    )
+    return f"{up}, {chain}{sight}, {_relays(status)}, {status.links} lines of sight{goal}"
 
 
 def draw(status: Status, mission: Mission, now_s: float) -> Table:
@@ -35,13 +35,15 @@ def draw(status: Status, mission: Mission, now_s: float) -> Table:
     length = f" of {mission.duration_s:g} s" if mission.duration_s is not None else " s, Ctrl-C ends the run"
     chain = Text("chain connected", "bold green") if status.chain_connected else Text("chain broken", "bold red")
     sight = Text("agent visible", "green") if status.agent_visible else Text("agent out of sight", "red")
+    words = [Text("starting", "dim")] if status.deployment is None else [chain, sight]
     table = Table(
-        title=Text(" · ").join([Text(f"{mission.team}  {now_s:.0f}{length}"), chain, sight]),
+        title=Text(" · ").join([Text(f"{mission.team}  {now_s:.0f}{length}"), *words]),
         title_justify="left",
         caption=Text(_deployment(status)),
         caption_justify="left",
         box=None,
         pad_edge=False,
+        expand=True,  # else title and caption wrap at the width of the columns
     )
     for heading in ("peer", "does", "place", "task"):
         table.add_column(heading, min_width=10)
@@ -49,7 +51,8 @@ def draw(status: Status, mission: Mission, now_s: float) -> Table:
         {placement.robot: placement.spare for placement in status.deployment.placements} if status.deployment else {}
     )
     for peer, entry in zip(status.peers, mission.roster, strict=True):
-        task = {"base_station": "base station", "tracked_agent": f"walks to {_place(status.goal)}"}.get(entry.role, "")
+        walk = f"walks to {_place(status.goal)}" if status.goal else "has no goal"
+        task = {"base_station": "base station", "tracked_agent": walk}.get(entry.role, "")
         if entry.role == "robot" and peer.name in spare:
             task = "spare" if spare[peer.name] else "relay"
         table.add_row(peer.name, Text(peer.mode, _COLOURS.get(peer.mode, "")), _place(peer.position), task)
@@ -60,7 +63,11 @@ def _deployment(status: Status) -> str:
     deployment = status.deployment
     if deployment is None:
         return "no deployment yet"
-    return f"deployment {deployment.decision}: {status.relays} relays, {deployment.reason}"
+    return f"deployment {deployment.decision}: {deployment.reason}"
+
+
+def _relays(status: Status) -> str:
+    return f"{status.relays} relay{'' if status.relays == 1 else 's'}"
 
 
 def _place(point: Point | None) -> str:

@@ -134,7 +134,7 @@ def test_the_display_says_it_in_a_line_and_in_a_table(view: TeamView, mission: M
     view.handle(said("base", deployment(1), sequence=1), 0.0)
     status = view.status(0.0)
     assert describe(status, 12.34) == (
-        "  12.3 s  2/4 up, chain connected, 1 relays, 1 lines of sight, agent to 8.0, 2.0"
+        "  12.3 s  2/4 up, chain connected, 1 relay, 1 lines of sight, agent to 8.0, 2.0"
     )
     console = Console(width=100, record=True, file=io.StringIO())
     console.print(draw(status, mission, 1.0))
