@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import reprlib
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -31,6 +32,8 @@ _GEOGRAPHIC_EPSG = frozenset(
     {4171, 4230, 4258, 4267, 4269, 4277, 4283, 4326, 4490, 4612, 4617, 4674, 4979, 6318, 6668, 7844, 9000}
 )
 _EPSG = re.compile(r"EPSG:+(?:[\d.]*:)?(\d+)", re.IGNORECASE)
+
+_FORMATS = "name a .json or .geojson file with polygons, or the .yaml of an occupancy grid"
 
 
 class UnreadableMap(ValueError):
@@ -57,14 +60,17 @@ def read_polygon_file(path: Path, containing: Floats | None = None) -> PolygonMa
     Raises:
         UnreadableMap: the file is absent, unreadable, neither form, or not in metres.
     """
-    content = _read_json(path)
-    if not isinstance(content, dict):
-        raise UnreadableMap(
-            f'{path}: the file holds no JSON object: expected {{"outer": [[x, y], ...], ...}} or GeoJSON'
-        )
-    if "type" in content and "outer" not in content:
-        return _choose_polygon(path, content, containing)
-    return _read_project_map(path, content)
+    try:
+        content = _read_json(path)
+        if not isinstance(content, dict):
+            raise UnreadableMap(
+                f'{path}: the file holds no JSON object: expected {{"outer": [[x, y], ...], ...}} or GeoJSON'
+            )
+        if "type" in content and "outer" not in content:
+            return _choose_polygon(path, content, containing)
+        return _read_project_map(path, content)
+    except RecursionError:
+        raise UnreadableMap(f"{path}: its lists are nested too deeply for a map: rings are lists of [x, y]") from None
 
 
 def write_polygon_file(path: Path, name: str, outer: Floats, holes: Sequence[Floats], source: str) -> None:
@@ -99,15 +105,15 @@ def _read_json(path: Path) -> Any:
     except OSError as error:
         raise UnreadableMap(f"{path}: cannot be read ({error.strerror}): check its permissions") from None
     except UnicodeDecodeError:
-        raise UnreadableMap(
-            f"{path}: this is not text: name a .json or .geojson file, or the .yaml of an occupancy grid"
-        ) from None
+        raise UnreadableMap(f"{path}: this is not text: {_FORMATS}") from None
     except json.JSONDecodeError as error:
+        if path.suffix.lower() not in {".json", ".geojson"}:
+            raise UnreadableMap(f"{path}: this is no map: {_FORMATS}") from None
         raise UnreadableMap(
             f"{path}: bad JSON at line {error.lineno}, column {error.colno} ({error.msg}): correct it there"
         ) from None
-    except RecursionError:
-        raise UnreadableMap(f"{path}: its lists are nested too deeply for a map: rings are lists of [x, y]") from None
+    except ValueError:  # the interpreter reads whole numbers of at most 4300 digits
+        raise UnreadableMap(f"{path}: it holds a number of thousands of digits: give coordinates in metres") from None
 
 
 def _read_project_map(path: Path, content: dict[str, Any]) -> PolygonMap:
@@ -118,7 +124,9 @@ def _read_project_map(path: Path, content: dict[str, Any]) -> PolygonMap:
         raise UnreadableMap(f'{path}: unknown field "{unknown[0]}": a map has {", ".join(sorted(_FIELDS))}')
     units = content.get("units", "metres")
     if not isinstance(units, str) or units not in _METRES:
-        raise UnreadableMap(f'{path}: its units are {units!r}: convert it to metres and write "units": "metres"')
+        raise UnreadableMap(
+            f'{path}: its units are {reprlib.repr(units)}: convert it to metres and write "units": "metres"'
+        )
     holes = content.get("holes", [])
     if not isinstance(holes, list):
         raise UnreadableMap(f'{path}: the field "holes" is not a list of rings: write [] for none')

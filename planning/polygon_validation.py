@@ -19,6 +19,9 @@ Bools = NDArray[np.bool_]
 RELATIVE_TOLERANCE = 1e-9
 """Two things nearer than this share of the map's diagonal touch."""
 
+FARTHEST_M = 1e7
+"""Farther from the origin no coordinate may be: a quarter of the way around the Earth."""
+
 _NOTHING = 0
 _TOUCHES = 1
 _CROSSES = 2
@@ -42,19 +45,31 @@ def read_ring(points: ArrayLike, index: int) -> Floats:
     """Points of ring ``index`` as (n, 2) float, metres.
 
     Raises:
-        InvalidEnvironment: not a list of [x, y], not finite, or fewer than 3 points.
+        InvalidEnvironment: not a list of [x, y], not finite, beyond `FARTHEST_M`, or fewer than 3 points.
     """
+    ring_name = name_ring(index)
+    remedy = "give metres in a local frame whose origin is near the map"
     try:
         ring = np.array(points, dtype=np.float64, order="C")
-    except (TypeError, ValueError):
+    except OverflowError:
+        raise InvalidEnvironment(f"{ring_name} has a coordinate beyond {FARTHEST_M:.0f} m: {remedy}") from None
+    except (TypeError, ValueError, RecursionError):
         ring = np.empty(0)
-    ring_name = name_ring(index)
     if ring.ndim != 2 or ring.shape[1] != 2:
         raise InvalidEnvironment(f"{ring_name} is not a list of points: give it as [[x, y], [x, y], ...] in metres")
+    if isinstance(points, list | tuple):  # as files have it, where numpy would take true for 1 and "1" too
+        for row, point in enumerate(points):
+            if any(isinstance(value, bool | str) for value in point):
+                ring[row] = np.nan
     lost = np.flatnonzero(~np.isfinite(ring).all(axis=1))
     if lost.size:
         raise InvalidEnvironment(
             f"{ring_name} has a coordinate that is not a finite number at its point {lost[0] + 1}: correct or delete it"
+        )
+    far = np.flatnonzero((np.abs(ring) > FARTHEST_M).any(axis=1))
+    if far.size:
+        raise InvalidEnvironment(
+            f"{ring_name} has a coordinate beyond {FARTHEST_M:.0f} m at its point {far[0] + 1}: {remedy}"
         )
     if len(ring) < 3:
         raise InvalidEnvironment(f"{ring_name} has {len(ring)} point(s): a ring needs at least 3")

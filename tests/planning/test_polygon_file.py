@@ -17,6 +17,7 @@ from tests.planning.polygons import environment_of, shared_maps
 
 SQUARE = [[0, 0], [10, 0], [10, 10], [0, 10]]
 PILLAR = [[4, 4], [6, 4], [6, 6], [4, 6]]
+DEEP = "DEEP"
 SMALL = [[20, 0], [23, 0], [23, 3], [20, 3]]
 
 
@@ -121,6 +122,7 @@ def test_component_that_holds_a_point_else_the_largest(
         ("", r"bad JSON at line 1, column 1"),
         ('{"outer": [\n[0, 0],\n[1, 0]\n[1, 1]]}', r"bad JSON at line 4, column 1 .*correct it there"),
         ("[" * 100_000, r"nested too deeply"),
+        ('{"outer": [[' + "9" * 5000 + ", 0], [1, 0], [1, 1]]}", r"a number of thousands of digits"),
         ([SQUARE], r"holds no JSON object"),
         ({"name": "hall"}, r'the field "outer" is missing: add it as a list of \[x, y\] in metres'),
         ({"outer": SQUARE, "hole": [PILLAR]}, r'unknown field "hole"'),
@@ -153,19 +155,56 @@ def test_unreadable_file_says_what_to_do(tmp_path: Path, content: object, senten
 
 
 @pytest.mark.parametrize(
-    "content",
+    ("content", "sentence"),
     [
-        {"outer": [[0, 0], [10, 10], [10, 0], [0, 10]]},
-        polygon([[0, 0], [10, 10], [10, 0], [0, 10]]),
-        {"type": "MultiPolygon", "coordinates": [[closed(SMALL)], [[[0, 0], [1, "x"], [1, 1]]]]},
-        '{"outer": [[0, 0], [NaN, 0], [1, 1]]}',
+        ({"outer": [[0, 0], [10, 10], [10, 0], [0, 10]]}, r"the outer ring crosses itself"),
+        (polygon([[0, 0], [10, 10], [10, 0], [0, 10]]), r"the outer ring crosses itself"),
+        (
+            {"type": "MultiPolygon", "coordinates": [[closed(SMALL)], [[[0, 0], [1, "x"], [1, 1]]]]},
+            r"the outer ring is not a list of points",
+        ),
+        ('{"outer": [[0, 0], [NaN, 0], [1, 1]]}', r"not a finite number at its point 2"),
+        ('{"outer": [[0, 0], [true, 0], [1, 1]]}', r"not a finite number at its point 2"),
+        ('{"outer": [[0, 0], [1, 0], [1, "1"]]}', r"not a finite number at its point 3"),
+        ('{"outer": [[0, 0], [1, null], [1, 1]]}', r"not a finite number at its point 2"),
+        ({"outer": [[0, 0], [10**400, 0], [1, 1]]}, r"a coordinate beyond 10000000 m: give metres in a local frame"),
+        ({"outer": SQUARE, "holes": [[[4, 4], [4, 5], [-2e7, 5]]]}, r"hole 1 has .* beyond 10000000 m at its point 3"),
+        ({"outer": [[1e300, 0], [1e300, 1], [0, -1e308]]}, r"a coordinate beyond 10000000 m at its point 1"),
     ],
 )
-def test_invalid_rings_name_the_file(tmp_path: Path, content: object) -> None:
+def test_invalid_rings_name_the_file(tmp_path: Path, content: object, sentence: str) -> None:
     path = write(tmp_path, content)
-    with pytest.raises(InvalidEnvironment) as refusal:
+    with pytest.raises(InvalidEnvironment, match=sentence) as refusal:
         Environment.load(path)
     assert str(refusal.value).startswith(f"{path}: ")
+    assert len(str(refusal.value)) < len(str(path)) + 150
+
+
+@pytest.mark.parametrize("name", ["map.txt", "map", "map.pgm"])
+def test_what_is_no_map_by_name_and_content_is_told_the_formats(tmp_path: Path, name: str) -> None:
+    with pytest.raises(UnreadableMap, match=r"this is no map: name a .json or .geojson file .*\.yaml"):
+        Environment.load(write(tmp_path, "P2 2 2 255", name))
+    assert Environment.load(write(tmp_path, {"outer": SQUARE}, name)).area == 100.0
+
+
+@pytest.mark.parametrize("depth", [50, 400, 700, 900, 4000])
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ('{"outer": ' + DEEP + "}", ""),
+        ('{"outer": [[0, 0], [1, 0], [1, 1]], "units": ' + DEEP + "}", ""),
+        ('{"type": "Polygon", "coordinates": [], "crs": ' + DEEP + "}", ""),
+        ('{"type": "GeometryCollection", "geometries": [', "]}"),
+        ('{"type": "Feature", "properties": null, "geometry": ', "}"),
+    ],
+)
+def test_deep_nesting_is_refused_in_a_sentence(tmp_path: Path, before: str, after: str, depth: int) -> None:
+    text = before * depth + "{}" + after * depth if after else before.replace(DEEP, "[" * depth + "]" * depth)
+    path = write(tmp_path, text)
+    with pytest.raises((UnreadableMap, InvalidEnvironment)) as refusal:
+        Environment.load(path)
+    assert str(refusal.value).startswith(f"{path}: ")
+    assert len(str(refusal.value)) < len(str(path)) + 150
 
 
 def test_absent_folder_binary_and_forbidden_files(tmp_path: Path) -> None:
