@@ -49,6 +49,12 @@ def measure(case: Case, *, least_s: float = 1.0, most_runs: int = 50) -> dict[st
     }
 
 
+def _time(seconds: float) -> str:
+    """Three digits and a unit, ten characters wide."""
+    factor, unit = (1e6, "µs") if seconds < 1e-3 else (1e3, "ms") if seconds < 1.0 else (1.0, "s ")
+    return f"{seconds * factor:>7.3g} {unit}"
+
+
 def main() -> None:
     """Measure, print, and write JSON where asked."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -62,8 +68,8 @@ def main() -> None:
             row = measure(case)
             rows.append(row)
             print(
-                f"{row['name']:<58}{row['minimum_s'] * 1e3:>7.1f} ms{row['median_s'] * 1e3:>7.1f} ms"
-                f"{row['target_s'] * 1e3:>7.0f} ms  {row['runs']:>4}"
+                f"{row['name']:<58}{_time(row['minimum_s'])}{_time(row['median_s'])}{_time(row['target_s'])}"
+                f"  {row['runs']:>4}"
             )
     if arguments.json:
         arguments.json.write_text(json.dumps(rows, indent=2) + "\n", encoding="utf-8")

@@ -4,11 +4,23 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import subprocess
 import sys
 import tempfile
+import uuid
 from collections.abc import Callable, Iterator
 from pathlib import Path
+
+TEAM = """
+map = "office"
+[base]
+position = [1.5, 11.0]
+[agent]
+start = [4.5, 10.5]
+[robots]
+count = 4
+"""
 
 
 def cases() -> Iterator[tuple[str, float, Callable[[], object]]]:
@@ -25,6 +37,18 @@ def cases() -> Iterator[tuple[str, float, Callable[[], object]]]:
         )
 
     yield "sightline plan, 200 vertices, whole process", 2.0, plan
+
+    (folder / "team.toml").write_text(TEAM, encoding="utf-8")
+
+    def obey() -> float:
+        command = [sys.executable, "-m", "launcher.cli", "run", "team.toml", "--duration", "3", "--name"]
+        done = subprocess.run([*command, uuid.uuid4().hex], cwd=folder, check=True, capture_output=True, text=True)
+        said = re.search(r"First deployment obeyed ([0-9.]+) s after the command", done.stdout)
+        if said is None:
+            raise RuntimeError(done.stdout)
+        return float(said.group(1))
+
+    yield "6 processes, command to first deployment obeyed", 6.0, obey
 
 
 def _comb(vertices: int) -> dict[str, object]:
