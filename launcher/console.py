@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import reprlib
 from collections.abc import Iterator
 from typing import Any
 
@@ -15,6 +16,12 @@ from protocol.messages import Point
 
 out = Console()
 err = Console(stderr=True)
+
+FARTHEST_M = 1e7
+"""The bound of :data:`protocol.messages.Coordinate`."""
+
+LONGEST_S = 86400.0
+"""Missions last a day at most, as in scenario files."""
 
 BAD_INPUT = 2
 """Exit status when what was asked for cannot be done as asked."""
@@ -61,8 +68,9 @@ def busy(text: str) -> Iterator[None]:
 
 
 def complain(text: str) -> None:
-    """Say what is wrong, on stderr, in one line."""
-    tell(f"sightline: {text}", err, "red")
+    """Say what is wrong, on stderr, in one line, whatever characters the user's names and files hold."""
+    line = "".join(sign if sign.isprintable() else ascii(sign)[1:-1] for sign in text)
+    tell(f"sightline: {line}", err, "red")
 
 
 def print_json(value: Any) -> None:
@@ -76,10 +84,25 @@ def read_point(text: str, place: str) -> Point:
     """The place in ``X,Y``.
 
     Raises:
-        ScenarioFault: it is no two finite numbers.
+        ScenarioFault: it is no two numbers of metres, or far off.
     """
-    with contextlib.suppress(ValueError):
+    try:
         x, y = (float(part) for part in text.split(","))
-        if math.isfinite(x) and math.isfinite(y):
-            return x, y
-    raise ScenarioFault(f"{place}: '{text}' is no place; write it in metres as X,Y, for example 3.5,-2")
+    except ValueError:
+        x = y = math.nan
+    if not (math.isfinite(x) and math.isfinite(y)):
+        raise ScenarioFault(f"{place}: '{text}' is no place; write it in metres as X,Y, for example 3.5,-2")
+    if max(abs(x), abs(y)) > FARTHEST_M:
+        raise ScenarioFault(f"{place}: '{text}' is farther off than any map; write it in metres as X,Y")
+    return x, y
+
+
+def check_option(option: str, value: float | None, least: float, most: float, unit: str = "") -> None:
+    """Hold a number against its bounds. Not left to typer, which answers with a box of several lines.
+
+    Raises:
+        ScenarioFault: the number is given, and less than ``least``, more than ``most``, or none (NaN).
+    """
+    if value is not None and not least <= value <= most:
+        bounds = f"from {least:g} to {most:g}{unit and ' ' + unit}"
+        raise ScenarioFault(f"{option} {reprlib.repr(value)} is out of range; give a number {bounds}")

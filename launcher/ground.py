@@ -9,6 +9,7 @@ from pathlib import Path
 import shapely
 
 from launcher.scenario import ScenarioFault
+from launcher.wording import text_of
 from planning.environment import Environment
 from planning.inflation import NothingLeft
 from protocol.messages import Point
@@ -33,34 +34,64 @@ class Ground:
             what = f"inside a wall or off the map (x {x0:g} to {x1:g}, y {y0:g} to {y1:g})"
         raise ScenarioFault(f"{self.file}: {place} {text_of(point)} is {what}; {self._remedy(point, radius_m)}")
 
+    @classmethod
+    def around(cls, file: Path, map_file: Path, place: str, point: Point) -> Ground:
+        """The map, or of several parts of it that which holds a point of the file; raise unless the point is inside.
+
+        Raises:
+            ScenarioFault: the point is in a wall or off the map.
+            ValueError: the map cannot be read, one sentence.
+        """
+        try:
+            ground = cls(file, Environment.load(map_file, containing=point))
+        except ValueError:
+            # An occupancy grid is a map only around free floor. Whatever else is wrong with the map is said here again.
+            ground = cls(file, Environment.load(map_file))
+        ground.check_inside(place, point)
+        return ground
+
     def _remedy(self, point: Point, radius_m: float) -> str:
         """Name a place near by that would do."""
         roomy = self.environment.polygon.buffer(-radius_m - 0.05)
         if roomy.is_empty:
-            return "no place on this map is wide enough: make the radius smaller"
+            return self._too_small(radius_m) or "no place on this map is wide enough: make the radius smaller"
         near = shapely.get_coordinates(shapely.shortest_line(roomy, shapely.Point(point)))[0]
         return f"move it, for example to [{near[0]:.2f}, {near[1]:.2f}]"
 
-    def check_walk(self, who: str, places: dict[str, Point], radius_m: float, origin: Point, origin_place: str) -> None:
-        """Raise unless a disc fits at every place and can get there from ``origin``, or from what that sees."""
+    def _too_small(self, radius_m: float) -> str:
+        """A hint if the whole map is smaller than a disc, as it is when its coordinates are no metres."""
+        x0, y0, x1, y1 = self.environment.bounds
+        if max(x1 - x0, y1 - y0) > 2 * radius_m:
+            return ""
+        size = f"the whole map is {x1 - x0:.2g} m by {y1 - y0:.2g} m"
+        return f"{size}: make the radius smaller or, if the coordinates of the map are degrees, convert them to metres"
+
+    def check_walk(self, key: str, places: dict[str, Point], radius_m: float, origin: Point, origin_place: str) -> None:
+        """Raise unless a disc fits at every place and can get there from ``origin``, or from what that sees.
+
+        ``key`` is that of the radius in the file.
+        """
         for place, point in places.items():
             self.check_inside(place, point, radius_m)
-        free = self.room(who, radius_m, origin, origin_place)
+        free = self.room(key, radius_m, origin, origin_place)
         for place, point in places.items():
             if not free.contains([point])[0]:
                 raise ScenarioFault(
                     f"{self.file}: {place} {text_of(point)} cannot be reached from {origin_place} {text_of(origin)} "
-                    f"with a radius of {radius_m:g} m; move it, or make {who}.radius_m smaller"
+                    f"with a radius of {radius_m:g} m; move it, or make {key} smaller"
                 )
 
-    def room(self, who: str, radius_m: float, origin: Point, origin_place: str) -> Environment:
-        """Where the centre of a disc can be: the part of the free space at ``origin``, or that it sees."""
+    def room(self, key: str, radius_m: float, origin: Point, origin_place: str) -> Environment:
+        """Where the centre of a disc can be: the part of the free space at ``origin``, or that it sees.
+
+        ``key`` is that of the radius in the file.
+        """
         try:
             return self.environment.inflated(radius_m, containing=origin)
         except NothingLeft as problem:
             raise ScenarioFault(
-                f"{self.file}: {who}.radius_m = {radius_m:g} leaves no room at {origin_place} {text_of(origin)}; "
-                "make it smaller, or move to where there is more room"
+                f"{self.file}: {key} = {radius_m:g} leaves no room at {origin_place} {text_of(origin)}; "
+                + (self._too_small(radius_m) or "make it smaller, or move to where there is more room")
             ) from problem
 
     def check_apart(self, discs: Sequence[tuple[str, Point, float]]) -> None:
@@ -77,8 +108,3 @@ class Ground:
 def named(place: str, points: tuple[Point, ...]) -> dict[str, Point]:
     """Points of a list by their places in the file, e.g. ``agent.goals[2]``."""
     return {f"{place}[{index}]": point for index, point in enumerate(points)}
-
-
-def text_of(point: Point) -> str:
-    """A point as the file has it."""
-    return f"[{point[0]:g}, {point[1]:g}]"

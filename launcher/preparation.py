@@ -12,11 +12,12 @@ from pathlib import Path
 import numpy as np
 
 from agents.casting import Casting
-from agents.leader import DeploymentPlanner
+from agents.leader import DeploymentPlanner, TooManyCells
 from agents.mission import Behaviour, Mission, OnDemand, RosterEntry, Scripted, Wandering
-from launcher.ground import Ground, named, text_of
+from launcher.ground import Ground, named
 from launcher.kernels import warm_up
 from launcher.scenario import Scenario, ScenarioFault, find_map, read_scenario
+from launcher.wording import counted, text_of
 from planning.deployment import NoChain
 from planning.environment import Environment
 from protocol.messages import Point
@@ -57,22 +58,24 @@ def prepare(file: Path, announce: Callable[[str], None]) -> Preparation:
     scenario = read_scenario(file)
     map_file = find_map(scenario.map, file.parent, f"{file}: map: ")
     warm_up(announce, ["planning"])
-    environment = Environment.load(map_file, containing=scenario.base.position)
-    ground = Ground(file, environment)
-    ground.check_inside("base.position", scenario.base.position)
+    ground = Ground.around(file, map_file, "base.position", scenario.base.position)
+    environment = ground.environment
     agent, robots = scenario.agent, scenario.robots
     walk = {"agent.start": agent.start} | named("agent.goals", agent.goals)
-    ground.check_walk("agent", walk, agent.radius_m, agent.start, "agent.start")
+    ground.check_walk("agent.radius_m", walk, agent.radius_m, agent.start, "agent.start")
     if robots.starts:
         places = named("robots.starts", robots.starts)
-        ground.check_walk("robots", places, robots.radius_m, scenario.base.position, "base.position")
+        ground.check_walk("robots.radius_m", places, robots.radius_m, scenario.base.position, "base.position")
     starts = robots.starts or _automatic_starts(ground, scenario)
     robot_discs = [(place, start, robots.radius_m) for place, start in named("robots.starts", starts).items()]
     ground.check_apart([("agent.start", agent.start, agent.radius_m), *robot_discs])
     mission = _mission(scenario, starts)
     if len(environment.vertices) > LARGE:
         announce(f"Preparing the planner for a map of {len(environment.vertices)} vertices ...")
-    planner = Casting(mission, environment).planner()
+    try:
+        planner = Casting(mission, environment).planner()
+    except TooManyCells as problem:
+        raise ScenarioFault(f"{file}: map: {problem}") from problem
     warnings = _check_robots_suffice(file, scenario, planner)
     return Preparation(scenario, environment, mission, planner, warnings)
 
@@ -85,7 +88,7 @@ def _automatic_starts(ground: Ground, scenario: Scenario) -> tuple[Point, ...]:
     environment, file = ground.environment, ground.file
     count, radius = scenario.robots.count or 0, scenario.robots.radius_m
     base, agent = np.array(scenario.base.position), np.array(scenario.agent.start)
-    free = ground.room("robots", radius, scenario.base.position, "base.position")
+    free = ground.room("robots.radius_m", radius, scenario.base.position, "base.position")
     pitch = (2 + GAP) * radius
     x0, y0, x1, y1 = environment.bounds
     reach = min(float(np.hypot(x1 - x0, y1 - y0)), pitch * (6 + 2 * count**0.5))
@@ -101,8 +104,8 @@ def _automatic_starts(ground: Ground, scenario: Scenario) -> tuple[Point, ...]:
     candidates = candidates[environment.line_of_sight(base, candidates)]
     if len(candidates) < count:
         raise ScenarioFault(
-            f"{file}: only {len(candidates)} robots of radius {radius:g} m have room near base.position and in its "
-            f"sight, and robots.count is {count}; give their places as robots.starts"
+            f"{file}: near base.position and in its sight there is room for {counted(len(candidates), 'robot')} of "
+            f"radius {radius:g} m, and robots.count is {count}; give their places as robots.starts"
         )
     return tuple((round(float(x), 6), round(float(y), 6)) for x, y in candidates[:count])
 
@@ -155,10 +158,13 @@ def _check_robots_suffice(file: Path, scenario: Scenario, planner: DeploymentPla
             ) from problem
         if needed > count:
             raise ScenarioFault(
-                f"{file}: {place} {text_of(point)} needs {needed} robots between base and agent, and there "
-                f"{'is' if count == 1 else 'are'} {count}; make robots.count at least {needed}, or move it"
+                f"{file}: {place} {text_of(point)} needs {counted(needed, 'robot')} between base and agent, and "
+                f"there {'is' if count == 1 else 'are'} {count}; make robots.count at least {needed}, or move it"
             )
     most = planner.most_relays_needed()
     if most <= count:
         return ()
-    return (f"some places of this map need {most} robots, and there are {count}: in those the chain will be broken",)
+    return (
+        f"some places of this map need {counted(most, 'robot')}, and there {'is' if count == 1 else 'are'} {count}: "
+        "in those the chain will be broken",
+    )

@@ -31,6 +31,9 @@ from protocol.zenoh_bus import ZenohBus, free_endpoints
 OBSERVER = "launcher"
 """The launcher listens to its team as an operator of this name."""
 
+STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+"""Any of these ends the run in order."""
+
 LOOK_S = 0.2
 """How often the launcher looks at what it has heard."""
 LINE_S = 5.0
@@ -83,10 +86,25 @@ def run(file: Path, name: str | None, duration_s: float | None, console: Console
     course = Course(folder)
     view = TeamView(mission, preparation.environment)
     supervisor = Supervisor(mission, folder.path, preparation.planner, lambda text: tell(text, console), view.position)
-    supervisor.launch()
+    stop = asyncio.Event()
+    _launch(supervisor, stop)
     tell("Processes: " + ", ".join(f"{peer.name} {peer.pid}" for peer in supervisor.peers.values()), console)
-    asyncio.run(_accompany(mission, view, supervisor, course, console))
+    asyncio.run(_accompany(mission, view, supervisor, course, stop, console))
     return course
+
+
+def _launch(supervisor: Supervisor, stop: asyncio.Event) -> None:
+    """Start the processes. A signal to stop is noted from now on: what has been started is to be stopped in order.
+
+    Forks would inherit our handlers and lose a signal that comes before they listen; it waits for them instead.
+    """
+    for number in STOPPING:
+        signal.signal(number, lambda *_: stop.set())
+    signal.pthread_sigmask(signal.SIG_BLOCK, STOPPING)
+    try:
+        supervisor.launch()
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, STOPPING)
 
 
 def reserve_endpoints(file: Path, preparation: Preparation) -> list[str]:
@@ -109,12 +127,11 @@ def reserve_endpoints(file: Path, preparation: Preparation) -> list[str]:
 
 
 async def _accompany(
-    mission: Mission, view: TeamView, supervisor: Supervisor, course: Course, console: Console
+    mission: Mission, view: TeamView, supervisor: Supervisor, course: Course, stop: asyncio.Event, console: Console
 ) -> None:
-    """Watch the team until the end, then stop it."""
-    stop = asyncio.Event()
+    """Watch the team until the end, or until it is to stop, then stop it."""
     loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    for number in STOPPING:
         loop.add_signal_handler(number, stop.set)
     inbox: Inbox[None] = Inbox()
     bus: ZenohBus | None = None

@@ -7,8 +7,10 @@ the map and makes the :class:`~agents.mission.Mission`.
 from __future__ import annotations
 
 import difflib
+import errno
 import math
 import re
+import stat
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,6 +20,7 @@ import msgspec
 from msgspec import Meta
 
 import maps
+from launcher.wording import counted
 from protocol.keys import is_name
 from protocol.messages import Point
 
@@ -27,7 +30,13 @@ Metres = Annotated[float, Meta(gt=0, le=100)]
 Speed = Annotated[float, Meta(gt=0, le=100)]
 Rate = Annotated[float, Meta(ge=0.1, le=100)]
 Pause = Annotated[float, Meta(ge=0, le=86400)]
-Period = Annotated[float, Meta(gt=0, le=86400)]
+Duration = Annotated[float, Meta(gt=0, le=86400)]
+
+MOST_ROBOTS = 40
+"""Every peer holds a connection to every other, which is good for about so many."""
+
+REPETITIONS = 4
+"""The base station says its orders so often while they are valid (:data:`agents.base_station.REPETITIONS`)."""
 
 
 class ScenarioFault(ValueError):
@@ -39,7 +48,7 @@ class _Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 
 class Base(_Table, frozen=True, kw_only=True):
-    """``[base]``: the base station, which stands still."""
+    """``[base]``: the base station, a post that stands still and takes no room: robots and agent may stand on it."""
 
     position: Point
 
@@ -61,7 +70,7 @@ class Agent(_Table, frozen=True, kw_only=True):
 class Robots(_Table, frozen=True, kw_only=True):
     """``[robots]``: either ``count``, and they start around the base station, or their ``starts``."""
 
-    count: Annotated[int, Meta(ge=1, le=200)] | None = None
+    count: Annotated[int, Meta(ge=1, le=MOST_ROBOTS)] | None = None
     starts: tuple[Point, ...] = ()
     speed_m_s: Speed = 1.0
     radius_m: Metres = 0.2
@@ -78,8 +87,8 @@ class Planning(_Table, frozen=True, kw_only=True):
     """``[planning]``: how the leader plans."""
 
     decomposition: Literal["inflection", "aspect"] = "inflection"
-    period_s: Period = 0.5
-    valid_for_s: Period = 3.0
+    period_s: Annotated[float, Meta(ge=0.05, le=86400)] = 0.5
+    valid_for_s: Annotated[float, Meta(ge=0.2, le=86400)] = 3.0
 
 
 class Network(_Table, frozen=True, kw_only=True):
@@ -98,7 +107,7 @@ class Scenario(_Table, frozen=True, kw_only=True):
     robots: Robots
     name: str = ""
     """Name of team and run; the file's name when it is not given."""
-    duration_s: Period | None = None
+    duration_s: Duration | None = None
     """Without it the run lasts until Ctrl-C."""
     seed: Annotated[int, Meta(ge=0, le=2**53)] = 0
     rates: Rates = Rates()
@@ -137,15 +146,27 @@ def find_scenario(name_or_path: str) -> Path:
         ScenarioFault: there is neither a file nor a packaged scenario of this name.
     """
     path = Path(name_or_path)
-    if path.is_file():
+    if stat.S_ISREG(_mode(path)):
         return path
     if name_or_path in packaged():
         return _PACKAGED / f"{name_or_path}.toml"
-    if path.is_dir():
+    if stat.S_ISDIR(_mode(path)):
         raise ScenarioFault(f"{name_or_path} is a folder: name the scenario file (.toml) in it")
     near = difflib.get_close_matches(name_or_path, packaged(), n=1)
     hint = f"did you mean '{near[0]}'" if near else f"give a TOML file or one of {', '.join(packaged())}"
     raise ScenarioFault(f"no scenario {name_or_path}: {hint}")
+
+
+def _mode(path: Path) -> int:
+    """What :mod:`stat` tells kinds of files by; 0 if there is nothing, nor can be: a name too long, or with a NUL."""
+    try:
+        return path.stat().st_mode
+    except (FileNotFoundError, NotADirectoryError, ValueError):
+        return 0
+    except OSError as problem:
+        if problem.errno == errno.ENAMETOOLONG:
+            return 0
+        raise
 
 
 def find_map(name_or_path: str, folder: Path, place: str = "") -> Path:
@@ -157,11 +178,11 @@ def find_map(name_or_path: str, folder: Path, place: str = "") -> Path:
     if name_or_path in maps.names():
         return maps.path(name_or_path)
     path = folder / name_or_path
-    if path.is_file():
+    if stat.S_ISREG(_mode(path)):
         return path
     near = difflib.get_close_matches(name_or_path, maps.names(), n=1)
     hint = f"did you mean '{near[0]}'" if near else f"give a map file or one of {', '.join(maps.names())}"
-    if path.is_dir():
+    if stat.S_ISDIR(_mode(path)):
         hint = "that is a folder, name the map file in it"
     raise ScenarioFault(f"{place}no map {name_or_path}: {hint}")
 
@@ -174,6 +195,10 @@ def read_scenario(path: Path) -> Scenario:
     """
     try:
         raw = tomllib.loads(path.read_text(encoding="utf-8"))
+        for place, number in _numbers(raw, ""):
+            if not math.isfinite(number):
+                raise ScenarioFault(f"{path}: {place} is {number}; give a finite number")
+        scenario = msgspec.convert(raw, Scenario)
     except OSError as problem:
         raise ScenarioFault(f"{path}: cannot be read ({problem.strerror}); give the path of a TOML file") from problem
     except UnicodeDecodeError as problem:
@@ -181,13 +206,14 @@ def read_scenario(path: Path) -> Scenario:
     except tomllib.TOMLDecodeError as problem:
         said = str(problem)
         raise ScenarioFault(f"{path}: is not valid TOML, {said[:1].lower()}{said[1:]}; mend that line") from problem
-    for place, number in _numbers(raw, ""):
-        if not math.isfinite(number):
-            raise ScenarioFault(f"{path}: {place} is {number}; give a finite number")
-    try:
-        scenario = msgspec.convert(raw, Scenario)
     except msgspec.ValidationError as problem:
         raise ScenarioFault(f"{path}: {_explain(str(problem))}") from problem
+    except RecursionError as problem:
+        raise ScenarioFault(f"{path}: is nested too deeply; a place is [x, y], and nothing is deeper") from problem
+    except ScenarioFault:
+        raise
+    except ValueError as problem:  # the interpreter reads whole numbers of at most 4300 digits
+        raise ScenarioFault(f"{path}: holds a number of thousands of digits; give metres and seconds") from problem
     fault = _contradiction(scenario)
     if fault:
         raise ScenarioFault(f"{path}: {fault}")
@@ -219,15 +245,18 @@ def _contradiction(scenario: Scenario) -> str:
         return "[robots] says neither count nor starts; add count = 4, or starts = [[x, y], ...]"
     if robots.count is not None and robots.starts and robots.count != len(robots.starts):
         return (
-            f"robots.count is {robots.count} and robots.starts has {len(robots.starts)} places; remove one of the two"
+            f"robots.count is {robots.count} and robots.starts has {counted(len(robots.starts), 'place')}; "
+            "remove one of the two"
         )
-    if len(robots.starts) > 200:
-        return f"robots.starts has {len(robots.starts)} places; a team has at most 200 robots"
-    if scenario.planning.valid_for_s < 2 * scenario.planning.period_s:
-        return (
-            f"planning.valid_for_s ({scenario.planning.valid_for_s:g}) is less than two planning periods; "
-            f"make it at least {2 * scenario.planning.period_s:g}, or robots hold between two orders"
-        )
+    if len(robots.starts) > MOST_ROBOTS:
+        return f"robots.starts has {len(robots.starts)} places; a team has at most {MOST_ROBOTS} robots"
+    planning, control_s = scenario.planning, 1 / scenario.rates.control_hz
+    for least_s, what in ((2 * planning.period_s, "two planning"), (REPETITIONS * control_s, "four control")):
+        if planning.valid_for_s < least_s:
+            return (
+                f"planning.valid_for_s ({planning.valid_for_s:g}) is less than {what} periods; "
+                f"make it at least {least_s:g}, or robots hold between two orders"
+            )
     return ""
 
 
@@ -257,7 +286,7 @@ def _explain(message: str) -> str:
         got = _WORDS.get(kinds[2], f"a {kinds[2]}")
         return f"{place} is {got}; it must be {wanted}{_like(place)}"
     if length := re.fullmatch(r"Expected `array` of length 2, got (\d+)", what):
-        return f"{place} has {length[1]} numbers; a place is [x, y] in metres"
+        return f"{place} has {counted(int(length[1]), 'number')}; a place is [x, y] in metres"
     if enum := re.fullmatch(r"Invalid enum value '(.*)'", what):
         choices = _choices(place)
         near = difflib.get_close_matches(enum[1], choices, n=1)
@@ -265,7 +294,9 @@ def _explain(message: str) -> str:
         return f"{place} is '{enum[1]}'; {hint}"
     if bound := re.fullmatch(r"Expected `(.*)` (>=|>|<=|<) (\S+)", what):
         words = {">=": "at least", ">": "more than", "<=": "at most", "<": "less than"}
-        return f"{place} is out of range; it must be {words[bound[2]]} {float(bound[3]):g}"
+        return f"{place} is out of range; it must be {words[bound[2]]} {bound[3].removesuffix('.0')}"
+    if what == "Number out of range":
+        return f"{place} is out of range; it must have fewer digits"
     return f"{place or 'the file'} does not fit: {what[:1].lower()}{what[1:]}"
 
 
@@ -293,12 +324,12 @@ def _choices(place: str) -> list[str]:
 def _unknown_key(key: str, place: str) -> str:
     """A sentence for a key that is not known: the near one, or one of another table, or all there are."""
     known = list(_table_at(place).__struct_fields__)
-    title = f"[{place}]" if place else "the top of the file"
+    title = f"in [{place}]" if place else "at the top of the file"
     near = difflib.get_close_matches(key, known, n=1)
     if near:
-        return f"unknown key '{key}' in {title}; did you mean '{near[0]}'"
+        return f"unknown key '{key}' {title}; did you mean '{near[0]}'"
     if not place:
         homes = [name for name in known if key in getattr(get_type_hints(Scenario)[name], "__struct_fields__", ())]
         if homes:
-            return f"unknown key '{key}' at the top of the file; it belongs into [{homes[0]}]"
-    return f"unknown key '{key}' in {title}; the keys there are {', '.join(known)}"
+            return f"unknown key '{key}' at the top of the file; it belongs in [{homes[0]}]"
+    return f"unknown key '{key}' {title}; the keys there are {', '.join(known)}"

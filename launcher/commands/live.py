@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from launcher.console import busy, complain, out, plainly, read_point, tell
+from launcher.console import LONGEST_S, busy, check_option, complain, out, plainly, read_point, tell
 from launcher.scenario import ScenarioFault, find_scenario
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ DEMO = "office"
 
 Name = Annotated[str | None, typer.Option(help="Name of the run's folder in runs/; scenario and time if not given.")]
 Duration = Annotated[
-    float | None, typer.Option("--duration", min=1.0, help="Seconds to run, instead of the scenario's duration.")
+    float | None, typer.Option("--duration", help="Seconds to run, 1 to 86400, instead of the scenario's duration.")
 ]
 
 
@@ -55,6 +55,7 @@ def goal(
 
 def _run(file: Path, name: str | None, duration_s: float | None) -> None:
     """Run, then merge, measure and say where everything is."""
+    check_option("--duration", duration_s, 1, LONGEST_S, "seconds")
     from launcher.run import run as run_team
 
     course = run_team(file, name, duration_s, out)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from launcher.console import busy, err, out, plainly, print_json, tell
+from launcher.console import LONGEST_S, busy, check_option, err, out, plainly, print_json, tell
 from launcher.scenario import ScenarioFault, find_scenario
 
 if TYPE_CHECKING:
@@ -16,16 +16,17 @@ if TYPE_CHECKING:
     from launcher.preparation import Preparation
     from launcher.report import Metrics
 
+MOST_SEEDS = 10000
+"""More missions than that nobody waits for."""
+
 AsJson = Annotated[bool, typer.Option("--json", help="Write JSON for programs.")]
 
 
 def simulate(
     scenario: Annotated[str, typer.Argument(help="A TOML file, or the name of a scenario that comes with Sightline.")],
-    seeds: Annotated[
-        int, typer.Option(min=1, max=10000, help="Missions with this many seeds, from the scenario's on.")
-    ] = 1,
+    seeds: Annotated[int, typer.Option(help="Missions with this many seeds, 1 to 10000, from the scenario's on.")] = 1,
     duration_s: Annotated[
-        float | None, typer.Option("--duration", min=1.0, help="Seconds, instead of the scenario's duration.")
+        float | None, typer.Option("--duration", help="Seconds, 1 to 86400, instead of the scenario's duration.")
     ] = None,
     record: Annotated[Path | None, typer.Option(help="Write the recording of the first mission (.rrd).")] = None,
     as_json: AsJson = False,
@@ -33,6 +34,8 @@ def simulate(
     """Run the very same roles in virtual time; print what it was worth."""
     with plainly():
         file = find_scenario(scenario)
+        check_option("--seeds", seeds, 1, MOST_SEEDS)
+        check_option("--duration", duration_s, 1, LONGEST_S, "seconds")
         if record is not None:
             _check_recording(record)
         _simulate(file, seeds, duration_s, record, as_json)

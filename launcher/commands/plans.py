@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from launcher.console import busy, err, out, plainly, print_json, read_point, tell
-from launcher.scenario import ScenarioFault, find_map
+from launcher.console import busy, check_option, err, out, plainly, print_json, read_point, tell
+from launcher.scenario import MOST_ROBOTS, ScenarioFault, find_map
+from launcher.wording import counted
 
 if TYPE_CHECKING:
     from planning.environment import Environment
@@ -22,6 +23,9 @@ Decomposition = Annotated[
 MapName = Annotated[str, typer.Argument(metavar="MAP", help="A map that comes with Sightline, or a map file.")]
 Picture = Annotated[Path | None, typer.Option(help="Write a picture (.png, .svg or .pdf).")]
 AsJson = Annotated[bool, typer.Option("--json", help="Write JSON for programs.")]
+
+LARGEST_M = 100.0
+"""Radius of a robot at most, as in scenario files."""
 
 
 def show(
@@ -103,7 +107,9 @@ def _describe_map(name: str, kind: Literal["inflection", "aspect"], picture: Pat
     tell(f"{facts['name']}  ({file})")
     tell(f"  size       {x1 - x0:.1f} × {y1 - y0:.1f} m, x {x0:g} to {x1:g}, y {y0:g} to {y1:g}")
     tell(f"  free       {environment.area:.1f} m²")
-    walls = f"{facts['vertices']} vertices, {facts['reflex_vertices']} of them reflex, {facts['holes']} holes"
+    walls = (
+        f"{facts['vertices']} vertices, {facts['reflex_vertices']} of them reflex, {counted(facts['holes'], 'hole')}"
+    )
     tell(f"  walls      {walls}")
     tell(f"  cells      {facts['cells']} ({kind})")
     tell("  counts     " + ", ".join(f"{key} {value}" for key, value in facts["counts"].items()))
@@ -117,8 +123,8 @@ def plan(
     name: MapName,
     base: Annotated[str, typer.Option(metavar="X,Y", help="Where the base station stands, in metres.")],
     agent: Annotated[list[str], typer.Option(metavar="X,Y", help="Where the agent is, in metres.")],
-    robots: Annotated[int | None, typer.Option(min=0, help="Robots there are; as many as needed if not given.")] = None,
-    radius_m: Annotated[float, typer.Option("--radius", min=0.0, help="Radius of a robot, in metres.")] = 0.2,
+    robots: Annotated[int | None, typer.Option(help="Robots there are; as many as needed if not given.")] = None,
+    radius_m: Annotated[float, typer.Option("--radius", help="Radius of a robot, in metres, 0 to 100.")] = 0.2,
     decomposition: Decomposition = "inflection",
     picture: Picture = None,
     as_json: AsJson = False,
@@ -130,6 +136,8 @@ def plan(
                 f"--agent was given {len(agent)} times: this version plans chains to one agent, not trees to several; "
                 "give it once"
             )
+        check_option("--robots", robots, 0, MOST_ROBOTS)
+        check_option("--radius", radius_m, 0, LARGEST_M, "metres")
         places = read_point(base, "--base"), read_point(agent[0], "--agent")
         _plan(name, *places, robots, radius_m, decomposition, picture, as_json)
 
@@ -148,23 +156,24 @@ def _plan(
     _check_picture(picture)
     from launcher.ground import Ground
     from launcher.kernels import warm_up
-    from planning.environment import Environment
 
     warm_up(_say(as_json), ["planning"])
-    environment = Environment.load(file, containing=base)
-    ground = Ground(file, environment)
-    ground.check_inside("--base", base)
+    ground = Ground.around(file, file, "--base", base)
+    environment = ground.environment
     ground.check_inside("--agent", agent)
     ground.room("--radius", radius_m, base, "--base")
-    from agents.leader import DeploymentPlanner
+    from agents.leader import DeploymentPlanner, TooManyCells
 
-    with busy("Planning ..."):
-        planner = DeploymentPlanner(environment, base, radius_m, kind)
+    try:
+        with busy("Planning ..."):
+            planner = DeploymentPlanner(environment, base, radius_m, kind)
+    except TooManyCells as problem:
+        raise ScenarioFault(f"{file}: {problem}") from problem
     needed = planner.relays_needed(agent)
     if robots is not None and robots < needed:
         raise ScenarioFault(
-            f"{file}: the agent at {agent[0]:g},{agent[1]:g} needs {needed} robots, and --robots says {robots}; "
-            f"give at least {needed}, or move the agent"
+            f"{file}: the agent at {agent[0]:g},{agent[1]:g} needs {counted(needed, 'robot')}, and --robots says "
+            f"{robots}; give at least {needed}, or move the agent"
         )
     chain = planner.plan(agent, (), {f"relay{i + 1}": base for i in range(needed)}, None)
     relays = [placement.position for placement in chain.placements if not placement.spare]
@@ -174,7 +183,7 @@ def _plan(
         from launcher.picture import draw_plan
         from planning.decomposition import decompose
 
-        title = f"{environment.name or file.stem}: {needed} relays"
+        title = f"{environment.name or file.stem}: {counted(needed, 'relay')}"
         draw_plan(environment, decompose(environment, kind).polygons, base, [agent], relays, links, picture, title)
     if as_json:
         print_json(
@@ -194,7 +203,7 @@ def _plan(
         )
         return
     spares = "" if robots is None else f", {robots - needed} to spare"
-    tell(f"{needed} relays{spares}; virtual cost {chain.cost:.3f}")
+    tell(f"{counted(needed, 'relay')}{spares}; virtual cost {chain.cost:.3f}")
     for title, (x, y) in zip(["base", *(f"relay {i + 1}" for i in range(needed)), "agent"], stations, strict=True):
         tell(f"  {title:8}  {x:8.3f}, {y:8.3f}")
     if picture is not None:

@@ -35,6 +35,7 @@ Write = Callable[[str], Path]
 @pytest.fixture
 def write(tmp_path: Path) -> Write:
     (tmp_path / "rooms.json").write_text(TWO_ROOMS)
+    write_grid(tmp_path / "grid.yaml")
 
     def write_scenario(text: str) -> Path:
         file = tmp_path / "trial.toml"
@@ -42,6 +43,15 @@ def write(tmp_path: Path) -> Write:
         return file
 
     return write_scenario
+
+
+def write_grid(file: Path, wall_column: int | None = None) -> None:
+    """A grid of 4 m by 4 m, cells of 0.1 m, all free or with a wall that has no door."""
+    row = bytes(0 if column == wall_column else 255 for column in range(40))
+    file.with_suffix(".pgm").write_bytes(b"P5 40 40 255\n" + 40 * row)
+    file.write_text(
+        "image: grid.pgm\nresolution: 0.1\norigin: [0, 0, 0]\nnegate: 0\nfree_thresh: 0.196\noccupied_thresh: 0.65\n"
+    )
 
 
 def silently(_: str) -> None:
@@ -58,14 +68,30 @@ FAULTS = {
     "no base": (GOOD.replace("[base]\nposition = [1.0, 1.0]\n", ""), "base is missing", "[base]"),
     "no robots": (GOOD.replace("count = 3", ""), "neither count nor starts", "count = 4"),
     "unknown key": (GOOD.replace("start =", "strat ="), "unknown key 'strat' in [agent]", "did you mean 'start'"),
-    "key in the wrong table": ("heartbeat_hz = 2\n" + GOOD, "unknown key 'heartbeat_hz'", "belongs into [rates]"),
+    "key in the wrong table": ("heartbeat_hz = 2\n" + GOOD, "unknown key 'heartbeat_hz'", "belongs in [rates]"),
     "unknown table": (GOOD + "\n[robotz]\n", "unknown key 'robotz'", "did you mean 'robots'"),
     "key unlike any": (GOOD + "\n[rates]\nzzz = 1\n", "unknown key 'zzz' in [rates]", "control_hz, heartbeat_hz"),
+    "unknown key at the top": ("zzz = 2\n" + GOOD, "unknown key 'zzz' at the top of the file", "map, base, agent"),
     "text for a number": (GOOD.replace("[6, 3]", '[6, "3"]'), "agent.goals[0][1] is text", "must be a number"),
     "number for a place": (GOOD.replace("[6, 3]", "6"), "agent.goals[0] is a whole number", "[x, y] in metres"),
+    "true for a number": (GOOD.replace("[6, 3]", "[6, true]"), "agent.goals[0][1] is true", "must be a number"),
+    "one coordinate": (GOOD.replace("[3, 3]", "[3]"), "agent.start has 1 number;", "[x, y] in metres"),
+    "far off": (GOOD.replace("[3, 3]", "[3, 1e300]"), "agent.start[1] is out of range", "at most 10000000"),
+    "number of 400 digits": (GOOD.replace("[3, 3]", f"[3, {10**400}]"), "agent.start[1] is out of range", "digits"),
+    "number of 5000 digits": (GOOD.replace("[3, 3]", f"[3, {'9' * 5000}]"), "thousands of digits", "give metres"),
+    "lists 900 deep": (GOOD.replace("[3, 3]", "[" * 900 + "]" * 900), "nested too deeply", "[x, y]"),
+    "lists 4000 deep": (GOOD.replace("[3, 3]", "[" * 4000), "nested too deeply", "[x, y]"),
+    "tables 4000 deep": (GOOD.replace("duration_s", "a." * 4000 + "b"), "nested too deeply", "[x, y]"),
+    "seed of 18 digits": (f"seed = {10**17}\n" + GOOD, "seed is out of range", "at most 9007199254740992"),
     "three coordinates": (GOOD.replace("[3, 3]", "[3, 3, 0]"), "agent.start has 3 numbers", "[x, y] in metres"),
     "fraction of a robot": (GOOD.replace("count = 3", "count = 2.5"), "robots.count is a number", "a whole number"),
     "no robot": (GOOD.replace("count = 3", "count = 0"), "robots.count is out of range", "at least 1"),
+    "too many robots": (GOOD.replace("count = 3", "count = 200"), "robots.count is out of range", "at most 40"),
+    "too many starts": (
+        GOOD.replace("count = 3", f"starts = {[[0.5 + 0.1 * i, 2.0] for i in range(41)]}"),
+        "robots.starts has 41 places",
+        "at most 40 robots",
+    ),
     "negative speed": (GOOD + "speed_m_s = -1\n", "robots.speed_m_s is out of range", "more than 0"),
     "not a number": (GOOD.replace("[6, 3]", "[nan, 3]"), "agent.goals[0][0] is nan", "a finite number"),
     "endless": (GOOD.replace("duration_s = 20", "duration_s = inf"), "duration_s is inf", "a finite number"),
@@ -79,8 +105,29 @@ FAULTS = {
         "planning.valid_for_s",
         "make it at least 4",
     ),
-    "count and starts differ": (GOOD + "starts = [[2, 2]]\n", "robots.count is 3 and robots.starts has 1", "remove"),
+    "planning without a pause": (
+        GOOD + "\n[planning]\nperiod_s = 0.001\n",
+        "planning.period_s is out of range",
+        "at least 0.05",
+    ),
+    "orders of no length": (
+        GOOD + "\n[planning]\nperiod_s = 0.05\nvalid_for_s = 0.1\n",
+        "planning.valid_for_s is out of range",
+        "at least 0.2",
+    ),
+    "orders that run out between two looks": (
+        GOOD + "\n[planning]\nvalid_for_s = 3\n[rates]\ncontrol_hz = 1\n",
+        "planning.valid_for_s (3) is less than four control periods",
+        "make it at least 4",
+    ),
+    "count and starts differ": (
+        GOOD + "starts = [[2, 2]]\n",
+        "robots.count is 3 and robots.starts has 1 place;",
+        "remove",
+    ),
     "absent map": (GOOD.replace("rooms.json", "absent.json"), "no map absent.json", "give a map file or one of"),
+    "map with a name too long": (GOOD.replace("rooms.json", "r" * 300), "no map rrr", "give a map file or one of"),
+    "map with NUL": (GOOD.replace("rooms.json", "r\\u0000"), "no map r", "give a map file or one of"),
     "misspelt map": (GOOD.replace("rooms.json", "rom1"), "no map rom1", "did you mean 'room1'"),
     "base in a wall": (GOOD.replace("[1.0, 1.0]", "[8.5, 1]"), "base.position [8.5, 1] is inside a wall", "move it"),
     "base off the map": (GOOD.replace("[1.0, 1.0]", "[-5, 1]"), "off the map (x 0 to 17, y 0 to 6)", "move it"),
@@ -109,11 +156,26 @@ FAULTS = {
         "0.4 m apart",
     ),
     "no room for so many": (
-        GOOD.replace("count = 3", "count = 100\nradius_m = 0.49"),
-        "robots of radius 0.49 m have room",
+        GOOD.replace("count = 3", "count = 40\nradius_m = 0.49"),
+        "of radius 0.49 m, and robots.count is 40",
         "robots.starts",
     ),
     "robots too wide": (GOOD + "radius_m = 5\n", "robots.radius_m = 5", "smaller"),
+    "agent too wide": (
+        GOOD.replace("[agent]", "[agent]\nradius_m = 9"),
+        "agent.start [3, 3] is 3.00 m from a wall",
+        "convert them to metres",
+    ),
+    "robots as wide as the map": (
+        GOOD + "radius_m = 9\n",
+        "robots.radius_m = 9 leaves no room",
+        "the whole map is 17 m by 6 m: make the radius smaller",
+    ),
+    "base outside a grid": (
+        GOOD.replace("rooms.json", "grid.yaml").replace("[1.0, 1.0]", "[-20, -0.5]"),
+        "base.position [-20, -0.5] is inside a wall or off the map (x 0 to 4, y 0 to 4)",
+        "move it, for example to [0.",
+    ),
 }
 
 
@@ -128,6 +190,43 @@ def test_a_fault_is_one_sentence_with_file_place_and_remedy(case: str, write: Wr
     assert place in said
     assert remedy in said
     assert "\n" not in said
+    assert len(said) < len(str(file)) + 600
+
+
+def test_a_base_in_a_smaller_part_of_a_grid_is_where_the_mission_is(write: Write, tmp_path: Path) -> None:
+    write_grid(tmp_path / "grid.yaml", wall_column=30)
+    text = GOOD.replace("rooms.json", "grid.yaml").replace("[1.0, 1.0]", "[3.5, 1]").replace("[3, 3]", "[3.5, 3]")
+    text = text.replace('"script"', '"wander"').replace("goals =", "#").replace("count = 3", "count = 1")
+    assert prepared(write(text)).environment.bounds == pytest.approx((3.1, 0.0, 4.0, 4.0))
+
+
+def test_too_many_cells_are_said_of_the_scenario(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("agents.leader.MOST_CELLS", 3)
+    file = write(GOOD)
+    with pytest.raises(ScenarioFault, match=r"cells") as caught:
+        prepared(file)
+    assert str(caught.value).startswith(f"{file}: map: ")
+
+
+def test_robots_and_agent_may_stand_on_the_base(write: Write) -> None:
+    text = GOOD.replace("count = 3", "starts = [[1.0, 1.0], [2, 2]]")
+    assert prepared(write(text)).mission.robots[0].start == (1.0, 1.0)
+
+
+def test_bounds_are_those_of_what_they_are_for() -> None:
+    import msgspec
+
+    from agents import base_station
+    from launcher import console, scenario
+    from planning import polygon_validation
+    from protocol.messages import Coordinate
+
+    assert scenario.REPETITIONS == base_station.REPETITIONS
+    assert console.FARTHEST_M == polygon_validation.FARTHEST_M
+    for far in (console.FARTHEST_M, -console.FARTHEST_M):
+        assert msgspec.convert(far, Coordinate) == far
+        with pytest.raises(msgspec.ValidationError):
+            msgspec.convert(1.001 * far, Coordinate)
 
 
 def test_an_unreadable_scenario_says_why(tmp_path: Path) -> None:

@@ -169,6 +169,32 @@ def test_a_run_from_start_to_recording(start: Callable[[], Run], monkeypatch: py
     assert "does not run" in nobody.stderr
 
 
+SIGNALLED = """
+import os, signal, sys
+from launcher.cli import app
+from launcher.supervisor import Supervisor
+launch = Supervisor.launch
+def signal_and_launch(self):
+    os.kill(os.getpid(), signal.SIGTERM)  # as soon as there is something to stop, at the earliest
+    launch(self)
+Supervisor.launch = signal_and_launch
+app(["run", "trial.toml", "--name", "trial"])
+"""
+
+
+def test_a_signal_during_the_start_stops_the_team_in_order(tmp_path: Path) -> None:
+    (tmp_path / "rooms.json").write_text(ROOMS)
+    (tmp_path / "trial.toml").write_text(SCENARIO)
+    ended = subprocess.run(
+        [sys.executable, "-c", SIGNALLED], cwd=tmp_path, capture_output=True, text=True, timeout=PATIENCE_S, check=False
+    )
+    assert ended.returncode == 130, ended.stdout + ended.stderr
+    assert "Stopping ..." in ended.stdout
+    assert "killed" not in ended.stdout
+    assert "Traceback" not in ended.stdout + ended.stderr
+    assert not processes_of(tmp_path)
+
+
 def test_what_cannot_run_starts_nothing_and_a_killed_launcher_leaves_nothing(start: Callable[[], Run]) -> None:
     run = start()
     wait_for(lambda: len(processes_of(run.folder)) == 4, "four processes")
