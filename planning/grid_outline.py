@@ -12,6 +12,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.corner_merging import merge_corners
 from planning.kernel import kernel
 
 Booleans: TypeAlias = NDArray[np.bool_]
@@ -39,8 +40,10 @@ def outline(free: Booleans, depth: Floats, tolerance: float) -> list[Integers]:
     """
     rings = trace(free)
     core = free & (depth > tolerance)
-    kept = _simplified(rings, _corners(core), tolerance)
-    return [ring[keep] for ring, keep in zip(rings, kept, strict=True)]
+    size = 0
+    while size != (size := sum(map(len, rings))):
+        rings = merge_corners(cut_corners(rings, core, tolerance), core)
+    return rings
 
 
 def without_pinches(free: Booleans, depth: Floats) -> Booleans:
@@ -115,15 +118,24 @@ def _corners(cells: Booleans) -> Integers:
     return np.argwhere((around == 1) | (around == 3) | diagonal)[:, ::-1]
 
 
-def _simplified(rings: list[Integers], core: Integers, tolerance: float) -> list[Booleans]:
-    """Which corners of each ring stay (see :func:`outline`)."""
+def cut_corners(rings: list[Integers], core: Booleans, tolerance: float) -> list[Integers]:
+    """Rings without the convex corners that cost less than the tolerance, and nothing of the core.
+
+    Args:
+        rings: corners (n, 2) int, free space to the left; simple, and not touching.
+        core: (h, w) bool, cells that must stay, all inside the rings.
+        tolerance: in cells, how far the new wall may be from the corner it replaces.
+
+    Returns:
+        Rings of the same kind; their corners are some of those given.
+    """
     sizes = [len(ring) for ring in rings]
     starts = np.concatenate([[0], np.cumsum(sizes)])
     corners = np.arange(starts[-1])
     before, after = corners - 1, corners + 1
     before[starts[:-1]] = starts[1:] - 1
     after[starts[1:] - 1] = starts[:-1]
-    points = np.concatenate([*rings, core]).astype(np.int64)
+    points = np.concatenate([*rings, _corners(core)]).astype(np.int64)
     shape = points.max(axis=0) // _BUCKET + 1
     bucket = points[:, 1] // _BUCKET * shape[0] + points[:, 0] // _BUCKET
     order = np.argsort(bucket, kind="stable")
@@ -131,7 +143,7 @@ def _simplified(rings: list[Integers], core: Integers, tolerance: float) -> list
     alive = np.ones(len(corners), dtype=np.bool_)
     while _cut_corners(points, before, after, alive, order, bucket_starts, shape[0], tolerance):
         pass
-    return np.split(alive, starts[1:-1])
+    return [ring[kept] for ring, kept in zip(rings, np.split(alive, starts[1:-1]), strict=True)]
 
 
 @kernel

@@ -1,16 +1,19 @@
 """Occupancy grids of ROS (`map_server`: a YAML file beside an image) as polygonal environments.
 
-The free cells that hang together by their sides, as ROS' map_server reads them, become a polygon with holes. Three
+The free cells that hang together by their sides, as ROS' map_server reads them, become a polygon with holes. Four
 things are done to them, in this order, and no more:
 
 - *Specks* go: occupied or unknown cells that hang together, sides or corners, amid free ones, and cover no more than
   `SPECK_AREA_M2` (10 cm by 10 cm), become free. On a grid coarser than 0.1 m a cell nothing is a speck.
-- Where two free cells meet in a corner only, one of them goes, so that walls never touch themselves. That can close a
-  passage one cell wide, too narrow for any robot.
+- *Crannies* are filled: slits between boards, the inside of pallets, cracks in a wall, wherever no disc with the
+  tolerance for a radius gets near. A passage narrower than twice the tolerance may be closed with them, and what
+  lies behind it is another component then.
+- Where two free cells meet in a corner only, one of them goes, so that walls never touch themselves.
 - The outline loses corners, from the inside only: no point of the polygon lies in a cell that is not free, and every
-  point that the outline cut off lies within the tolerance of such a cell.
+  point that the outline cut off lies within the tolerance of such a cell, as does every cranny.
 
-Free specks, and rooms seen through a window, are other components: they are no part of the environment.
+Free specks, and rooms seen through a window, are other components: they are no part of the environment. The tolerance
+is two cells unless told; it is written into the environment's `source`.
 """
 
 from __future__ import annotations
@@ -31,6 +34,9 @@ from planning.grid_outline import Booleans, Floats, outline, without_pinches
 SPECK_AREA_M2 = 0.01
 """Largest speck of occupied or unknown cells that is taken for noise."""
 
+TOLERANCE_CELLS = 2
+"""How far from a wall the outline may be cut short, in cells, unless told."""
+
 _MODES = ("trinary", "scale", "raw")
 
 
@@ -50,17 +56,20 @@ def load_occupancy_grid(
             an occupancy in percent, free below `free_thresh`, and `negate` has no effect (as in Nav2).
         containing: (2,) metres: the component that holds this point is meant, instead of the largest. Its cell is
             never cut off by the simplification.
-        tolerance_m: how far from a wall the outline may be cut short; at least one cell, two unless told.
+        tolerance_m: how far from a wall the outline may be cut short; at least one cell, two unless told. The coarser,
+            the fewer corners, and the fewer cells to plan on; keep it below the radius of the robots.
 
     Raises:
         BadGrid: what is wrong, and where.
     """
     path = Path(path)
     header = _Header(path)
-    tolerance = 2.0 if tolerance_m is None else tolerance_m / header.resolution_m
-    if not tolerance >= 1 - 1e-9:
+    if tolerance_m is None:
+        tolerance_m = TOLERANCE_CELLS * header.resolution_m
+    tolerance = tolerance_m / header.resolution_m + 1e-9
+    if not 1 <= tolerance < math.inf:
         raise BadGrid(
-            f"{path}: the tolerance of {tolerance_m} m is finer than the grid: "
+            f"{path}: the tolerance of {tolerance_m} m is no length, or finer than the grid: "
             f"give at least its resolution, {header.resolution_m} m"
         )
     free = _without_specks(header.free_cells(), SPECK_AREA_M2 / header.resolution_m**2)
@@ -70,9 +79,21 @@ def load_occupancy_grid(
     cell = None if containing is None else header.cell_at(np.asarray(containing, dtype=float), free)
     if cell is not None:
         depth[cell] = np.inf
-    free = _component(without_pinches(_component(free, cell), depth), cell)
-    rings = [header.to_map(ring) for ring in outline(free, depth, tolerance + 1e-9)]
-    return Environment(rings[0], rings[1:], name=path.stem)
+    spacious = _without_crannies(free, depth, tolerance)
+    if not spacious.any():
+        raise BadGrid(
+            f"{path}: the free floor is nowhere wider than twice the tolerance of {tolerance_m:g} m: "
+            f"give a smaller one, at least the resolution of {header.resolution_m} m"
+        )
+    free = _component(without_pinches(_component(spacious, cell), depth), cell)
+    if containing is not None and np.count_nonzero(free & (depth > tolerance)) == 1:
+        raise BadGrid(
+            f"{path}: {_name(containing)} is in a cranny no wider than twice the tolerance of {tolerance_m:g} m: "
+            "choose a point on open floor, or give a smaller tolerance"
+        )
+    rings = [header.to_map(ring) for ring in outline(free, depth, tolerance)]
+    source = f"occupancy grid {path.name}, outline within {tolerance_m:g} m of its walls"
+    return Environment(rings[0], rings[1:], name=path.stem, source=source)
 
 
 class _Header:
@@ -84,16 +105,18 @@ class _Header:
             keys = yaml.safe_load(path.read_text(encoding="utf-8"))
         except OSError as fault:
             raise BadGrid(f"{path}: cannot be read ({fault.strerror}): give the .yaml file of a grid") from None
-        except (yaml.YAMLError, UnicodeDecodeError) as fault:
+        except (yaml.YAMLError, ValueError, OverflowError, RecursionError) as fault:
             where = getattr(fault, "problem_mark", None)
             place = "" if where is None else f", line {where.line + 1}"
-            raise BadGrid(f"{path}{place}: this is not YAML: give the .yaml file of a grid, not its image") from None
+            raise BadGrid(
+                f"{path}{place}: this is no readable YAML: give the .yaml file of a grid, not its image"
+            ) from None
         if not isinstance(keys, dict):
             raise BadGrid(f"{path}: there are no keys: a grid's .yaml says 'image: map.pgm', 'resolution: 0.05', ...")
         self._keys = keys
         self.resolution_m = self._number("resolution", "metres per cell, e.g. 0.05")
-        if self.resolution_m <= 0:
-            raise self._refusal("resolution", "a positive number of metres per cell, e.g. 0.05")
+        if not 1e-4 <= self.resolution_m <= 1e3:
+            raise self._refusal("resolution", "a positive number of metres per cell, 0.0001 to 1000, e.g. 0.05")
         origin = self._key("origin", "the lower left corner, [x, y, yaw]")
         numbers = origin if isinstance(origin, list) else []
         if len(numbers) != 3 or not all(_is_number(number) for number in numbers):
@@ -165,9 +188,7 @@ class _Header:
             for column in sorted({math.floor(x - 1e-9), math.floor(x + 1e-9)}):
                 if 0 <= row < free.shape[0] and 0 <= column < free.shape[1] and free[row, column]:
                     return row, column
-        raise BadGrid(
-            f"{self.path}: ({point[0]:g}, {point[1]:g}) is not in a free cell of the grid: choose a point on free floor"
-        )
+        raise BadGrid(f"{self.path}: {_name(point)} is not in a free cell of the grid: choose a point on free floor")
 
     def _key(self, name: str, meaning: str) -> Any:
         if name not in self._keys:
@@ -181,7 +202,16 @@ class _Header:
         return float(value)
 
     def _refusal(self, name: str, wanted: str) -> BadGrid:
-        return BadGrid(f"{self.path}: key '{name}' is {self._keys[name]!r}: make it {wanted}")
+        return BadGrid(f"{self.path}: key '{name}' is {_shorten(self._keys[name])}: make it {wanted}")
+
+
+def _shorten(value: object) -> str:
+    """A value as in a sentence; neither integers of thousands of digits nor deep lists can be written out."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):
+        return f"a {type(value).__name__} too long to write"
+    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def _is_number(value: object) -> bool:
@@ -190,7 +220,7 @@ def _is_number(value: object) -> bool:
         return False
     try:
         return math.isfinite(float(value))
-    except ValueError:
+    except (ValueError, OverflowError):
         return False
 
 
@@ -205,9 +235,23 @@ def _without_specks(free: Booleans, most_cells: float) -> Booleans:
     return freed
 
 
+def _without_crannies(free: Booleans, depth: Floats, tolerance: float) -> Booleans:
+    """Free cells near those deeper than the tolerance: as near as, in a square corner, the corner is to the disc."""
+    core = depth > tolerance
+    if not core.any():
+        return core
+    spacious: Booleans = free & (ndimage.distance_transform_edt(~core) <= math.sqrt(2) * tolerance)
+    return spacious
+
+
 def _component(free: Booleans, cell: tuple[int, int] | None) -> Booleans:
     """Free cells joined by sides to `cell`, or, if it is None, the most there are."""
     labels, _ = ndimage.label(free)
     label = labels[cell] if cell is not None else np.bincount(labels[free]).argmax()
     joined: Booleans = labels == label
     return joined
+
+
+def _name(point: ArrayLike) -> str:
+    x, y = np.asarray(point, dtype=float)
+    return f"({x:g}, {y:g})"
