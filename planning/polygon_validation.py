@@ -19,8 +19,8 @@ Bools = NDArray[np.bool_]
 RELATIVE_TOLERANCE = 1e-9
 """Two things nearer than this share of the map's diagonal touch."""
 
-FARTHEST_M = 1e7
-"""Farther from the origin no coordinate may be: a quarter of the way around the Earth."""
+FARTHEST_M = 1e9
+"""Farther from the origin no coordinate may be: floating point resolves a tenth of a micrometre there."""
 
 _NOTHING = 0
 _TOUCHES = 1
