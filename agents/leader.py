@@ -204,7 +204,7 @@ class DeploymentPlanner:
         last = relays[-1].position if relays else self._base
         ahead = walk(way, np.linspace(0.0, PREVIEWS_M[-1], 33))
         serves = bool(np.any(self._environment.line_of_sight(np.array(last), ahead)))
-        reason = previous.reason if serves else f"{len(relays)} relays stay, which see nothing of the agent's way"
+        reason = previous.reason if serves else f"{_relays(len(relays))} kept, seeing nothing of the agent's way"
         return Proposal(relays, previous.cost, serves, reason)
 
     def _chains(self, way: Floats, robots: Mapping[str, Point], previous: Plan | None) -> list[Proposal]:
@@ -243,7 +243,7 @@ class DeploymentPlanner:
                 robots = identify_robots(move[:, chain.cells])
                 relays = tuple(self._placement(order[robot], stop) for robot, stop in zip(robots, stops, strict=True))
                 cost = float(sum(self._weights[hop] for hop in pairwise([self._base_cell, *stops, goal])))
-                return Proposal(relays, cost, True, f"{len(relays)} relays {where}")
+                return Proposal(relays, cost, True, f"{_relays(len(relays))} {where}")
         return None
 
     def _outward(self, agent: Point, robots: Mapping[str, Point], needed: int) -> Proposal:
@@ -254,7 +254,7 @@ class DeploymentPlanner:
         chosen = identify_robots(costs.reshape(len(names), len(places)))
         relays = tuple(self._placement(names[robot], place) for robot, place in zip(chosen, places, strict=True))
         missing = needed - len(relays)
-        reason = f"{needed} relays are needed and {missing} missing: the chain ends before the agent"
+        reason = f"{_relays(needed)} needed and {missing} missing: the chain ends before the agent"
         return Proposal(relays, 0.0, False, reason)
 
     def _best(
@@ -313,3 +313,7 @@ class DeploymentPlanner:
 
 def _name(point: Point) -> str:
     return f"({point[0]:g}, {point[1]:g}) m"
+
+
+def _relays(number: int) -> str:
+    return f"{number} relay{'' if number == 1 else 's'}"
