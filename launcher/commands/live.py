@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -78,4 +80,9 @@ def _conclude(course: Course) -> None:
     out.print(render(metrics))
     tell(f"Recording  {folder.recording}")
     tell(f"Metrics    {folder.metrics_file}")
-    tell(f"Open it    sightline review {folder.path}")
+    tell(f"Open it    {_command()} review {folder.path}")
+
+
+def _command() -> str:
+    """How this program is called from here: its name where the environment is active, else the way that was taken."""
+    return "sightline" if shutil.which("sightline") else sys.argv[0]
