@@ -137,7 +137,7 @@ class DeploymentPlanner:
             raise TooManyCells(
                 f"map {environment.name!r} has {len(self._cells)} {decomposition} cells, and at most {MOST_CELLS} "
                 "can be planned on: "
-                + ("use inflection cells" if decomposition == "aspect" else "simplify its outline")
+                + ("use inflection cells" if decomposition == "aspect" else "simplify it, a grid by a larger tolerance")
             )
         seen = mutual_visibility(self._cells)
         self._weights = virtual_weights(self._cells, seen)

@@ -12,6 +12,7 @@ from launcher.scenario import ScenarioFault
 from launcher.wording import text_of
 from planning.environment import Environment
 from planning.inflation import NothingLeft
+from planning.occupancy_grid import load_occupancy_grid
 from protocol.messages import Point
 
 
@@ -35,18 +36,20 @@ class Ground:
         raise ScenarioFault(f"{self.file}: {place} {text_of(point)} is {what}; {self._remedy(point, radius_m)}")
 
     @classmethod
-    def around(cls, file: Path, map_file: Path, place: str, point: Point) -> Ground:
+    def around(cls, file: Path, map_file: Path, place: str, point: Point, tolerance_m: float | None = None) -> Ground:
         """The map, or of several parts of it that which holds a point of the file; raise unless the point is inside.
+
+        ``tolerance_m`` as in :func:`load_map`.
 
         Raises:
             ScenarioFault: the point is in a wall or off the map.
             ValueError: the map cannot be read, one sentence.
         """
         try:
-            ground = cls(file, Environment.load(map_file, containing=point))
+            ground = cls(file, load_map(file, map_file, point, tolerance_m))
         except ValueError:
             # An occupancy grid is a map only around free floor. Whatever else is wrong with the map is said here again.
-            ground = cls(file, Environment.load(map_file))
+            ground = cls(file, load_map(file, map_file, None, tolerance_m))
         ground.check_inside(place, point)
         return ground
 
@@ -103,6 +106,29 @@ class Ground:
                         f"{self.file}: {place} {text_of(point)} overlaps {other} {text_of(taken)}; "
                         f"keep them {radius_m + other_radius_m:g} m apart"
                     )
+
+
+def load_map(file: Path, map_file: Path, containing: Point | None, tolerance_m: float | None) -> Environment:
+    """The map, or the part of it that holds a point.
+
+    Args:
+        file: says so: the scenario, or the map itself.
+        map_file: polygons or an occupancy grid.
+        containing: see :meth:`~planning.environment.Environment.load`.
+        tolerance_m: of the outline of an occupancy grid; None: what the grid's reader takes for good.
+
+    Raises:
+        ScenarioFault: there is a tolerance, and the map is no grid.
+        ValueError: the map cannot be read, one sentence.
+    """
+    if tolerance_m is None:
+        return Environment.load(map_file, containing)
+    if map_file.suffix.lower() not in {".yaml", ".yml"}:
+        raise ScenarioFault(
+            f"{file}: a tolerance of {tolerance_m:g} m is given, and {map_file.name} is no occupancy grid (.yaml); "
+            "leave it out"
+        )
+    return load_occupancy_grid(map_file, containing, tolerance_m)
 
 
 def named(place: str, points: tuple[Point, ...]) -> dict[str, Point]:

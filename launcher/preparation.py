@@ -58,7 +58,7 @@ def prepare(file: Path, announce: Callable[[str], None]) -> Preparation:
     scenario = read_scenario(file)
     map_file = find_map(scenario.map, file.parent, f"{file}: map: ")
     warm_up(announce, ["planning"])
-    ground = Ground.around(file, map_file, "base.position", scenario.base.position)
+    ground = Ground.around(file, map_file, "base.position", scenario.base.position, scenario.map_tolerance_m)
     environment = ground.environment
     agent, robots = scenario.agent, scenario.robots
     walk = {"agent.start": agent.start} | named("agent.goals", agent.goals)

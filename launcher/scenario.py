@@ -105,6 +105,8 @@ class Scenario(_Table, frozen=True, kw_only=True):
     base: Base
     agent: Agent
     robots: Robots
+    map_tolerance_m: Metres | None = None
+    """How far from a wall the outline of an occupancy grid may be cut short; two cells of the grid if not given."""
     name: str = ""
     """Name of team and run; the file's name when it is not given."""
     duration_s: Duration | None = None

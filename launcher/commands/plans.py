@@ -20,6 +20,10 @@ if TYPE_CHECKING:
 Decomposition = Annotated[
     Literal["inflection", "aspect"], typer.Option(help="Cells by inflection lines, or also by bitangents.")
 ]
+Tolerance = Annotated[
+    float | None,
+    typer.Option("--tolerance", help="Of an occupancy grid's outline, in metres, up to 100; two cells if not given."),
+]
 MapName = Annotated[str, typer.Argument(metavar="MAP", help="A map that comes with Sightline, or a map file.")]
 Picture = Annotated[Path | None, typer.Option(help="Write a picture (.png, .svg or .pdf).")]
 AsJson = Annotated[bool, typer.Option("--json", help="Write JSON for programs.")]
@@ -33,6 +37,7 @@ def show(
         str | None, typer.Argument(metavar="MAP", help="A map that comes with Sightline, or a map file; none: a list.")
     ] = None,
     decomposition: Decomposition = "inflection",
+    tolerance_m: Tolerance = None,
     picture: Picture = None,
     as_json: AsJson = False,
 ) -> None:
@@ -41,7 +46,8 @@ def show(
         if name is None:
             _list_maps(as_json)
         else:
-            _describe_map(name, decomposition, picture, as_json)
+            check_option("--tolerance", tolerance_m, 0, LARGEST_M, "metres")
+            _describe_map(name, decomposition, tolerance_m, picture, as_json)
 
 
 def _list_maps(as_json: bool) -> None:
@@ -74,14 +80,20 @@ def _facts(name: str, environment: Environment) -> dict[str, Any]:
     }
 
 
-def _describe_map(name: str, kind: Literal["inflection", "aspect"], picture: Path | None, as_json: bool) -> None:
+def _describe_map(
+    name: str,
+    kind: Literal["inflection", "aspect"],
+    tolerance_m: float | None,
+    picture: Path | None,
+    as_json: bool,
+) -> None:
     from launcher.kernels import warm_up
 
     file = find_map(name, Path())
     _check_picture(picture)
-    from planning.environment import Environment
+    from launcher.ground import load_map
 
-    environment = Environment.load(file)
+    environment = load_map(file, file, None, tolerance_m)
     warm_up(_say(as_json), ["planning"])
     from planning.decomposition import decompose
 
@@ -126,6 +138,7 @@ def plan(
     robots: Annotated[int | None, typer.Option(help="Robots there are; as many as needed if not given.")] = None,
     radius_m: Annotated[float, typer.Option("--radius", help="Radius of a robot, in metres, 0 to 100.")] = 0.2,
     decomposition: Decomposition = "inflection",
+    tolerance_m: Tolerance = None,
     picture: Picture = None,
     as_json: AsJson = False,
 ) -> None:
@@ -138,8 +151,9 @@ def plan(
             )
         check_option("--robots", robots, 0, MOST_ROBOTS)
         check_option("--radius", radius_m, 0, LARGEST_M, "metres")
+        check_option("--tolerance", tolerance_m, 0, LARGEST_M, "metres")
         places = read_point(base, "--base"), read_point(agent[0], "--agent")
-        _plan(name, *places, robots, radius_m, decomposition, picture, as_json)
+        _plan(name, *places, robots, radius_m, decomposition, tolerance_m, picture, as_json)
 
 
 def _plan(
@@ -149,6 +163,7 @@ def _plan(
     robots: int | None,
     radius_m: float,
     kind: Literal["inflection", "aspect"],
+    tolerance_m: float | None,
     picture: Path | None,
     as_json: bool,
 ) -> None:
@@ -158,7 +173,7 @@ def _plan(
     from launcher.kernels import warm_up
 
     warm_up(_say(as_json), ["planning"])
-    ground = Ground.around(file, file, "--base", base)
+    ground = Ground.around(file, file, "--base", base, tolerance_m)
     environment = ground.environment
     ground.check_inside("--agent", agent)
     ground.room("--radius", radius_m, base, "--base")

@@ -105,6 +105,8 @@ def test_plan_takes_negative_places_and_geojson(tmp_path: Path) -> None:
         (["map", "rom1"], ["no map rom1", "did you mean 'room1'"]),
         (["map", "room1", "--picture", "room1.bmp"], ["--picture", ".png"]),
         (["map", "room1", "--picture", "absent/room1.png"], ["--picture", "no folder absent"]),
+        (["map", "room1", "--tolerance", "0.1"], ["room1.json: a tolerance of 0.1 m", "leave it out"]),
+        (["map", "room1", "--tolerance", "nan"], ["--tolerance nan", "0 to 100 metres"]),
         (["plan", "room1", "--base", "5", "--agent", "8,10"], ["--base: '5' is no place", "X,Y"]),
         (["plan", "room1", "--base", "nan,1", "--agent", "8,10"], ["--base: 'nan,1' is no place"]),
         (

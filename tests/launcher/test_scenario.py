@@ -171,6 +171,11 @@ FAULTS = {
         "robots.radius_m = 9 leaves no room",
         "the whole map is 17 m by 6 m: make the radius smaller",
     ),
+    "tolerance of a polygon": (
+        GOOD.replace("duration_s = 20", "map_tolerance_m = 0.1"),
+        "a tolerance of 0.1 m is given, and rooms.json is no occupancy grid",
+        "leave it out",
+    ),
     "base outside a grid": (
         GOOD.replace("rooms.json", "grid.yaml").replace("[1.0, 1.0]", "[-20, -0.5]"),
         "base.position [-20, -0.5] is inside a wall or off the map (x 0 to 4, y 0 to 4)",
@@ -191,6 +196,13 @@ def test_a_fault_is_one_sentence_with_file_place_and_remedy(case: str, write: Wr
     assert remedy in said
     assert "\n" not in said
     assert len(said) < len(str(file)) + 600
+
+
+def test_the_tolerance_of_a_grid_is_the_scenarios(write: Write) -> None:
+    text = GOOD.replace("rooms.json", "grid.yaml").replace("[[6, 3], [12, 1]]", "[[3, 2]]")
+    assert "within 0.2 m" in prepare(write(text), silently).environment.source
+    coarse = text.replace("duration_s = 20", "map_tolerance_m = 0.35")
+    assert "within 0.35 m" in prepare(write(coarse), silently).environment.source
 
 
 def test_a_base_in_a_smaller_part_of_a_grid_is_where_the_mission_is(write: Write, tmp_path: Path) -> None:
