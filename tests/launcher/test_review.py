@@ -256,6 +256,8 @@ def test_the_picture_is_not_mirrored_and_no_view_complains(
         with review._headless_viewer(run_folder / "run.rrd") as viewer:
             reports = [(view.name, report) for view in viewer.get_state().views for report in view.reports]
     except RecordingFault as fault:
+        if "no renderer" not in str(fault):
+            raise
         pytest.skip(str(fault))
     assert reports == []
     pixels = np.asarray(Image.open(picture).convert("RGB")).astype(int)[:, : int(0.6 * 1600)]

@@ -16,6 +16,7 @@ import pytest
 from typer.testing import CliRunner
 
 from launcher.cli import app
+from launcher.supervisor import TERMINATE_S
 
 pytestmark = [pytest.mark.processes, pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")]
 
@@ -147,7 +148,8 @@ def test_a_run_from_start_to_recording(start: Callable[[], Run], monkeypatch: py
     time.sleep(3.0)  # the agent walks, and the rest of the team with it
 
     run.launcher.send_signal(signal.SIGINT)
-    wait_for(lambda: not processes_of(run.folder), "all peers to end", 3.0)
+    wait_for(lambda: not processes_of(run.folder), "all peers to end")
+    assert TERMINATE_S <= 2.0, "all are gone 3 s after Ctrl-C: this long for an orderly end, then SIGKILL"
     assert run.launcher.wait(PATIENCE_S) == 130, run.output
     assert "share of time" in run.output
     assert "Traceback" not in run.output
@@ -172,6 +174,7 @@ def test_a_run_from_start_to_recording(start: Callable[[], Run], monkeypatch: py
 SIGNALLED = """
 import os, signal, sys
 from launcher.cli import app
+from launcher.supervisor import TERMINATE_S
 from launcher.supervisor import Supervisor
 launch = Supervisor.launch
 def signal_and_launch(self):
