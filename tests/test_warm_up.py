@@ -74,12 +74,17 @@ assert not cold, cold
     assert done.returncode == 0, done.stderr
 
 
-def test_kernels_are_stamped_once_and_again_when_a_source_changes(
+def test_kernels_are_compiled_again_when_a_source_that_they_depend_on_changes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     package = tmp_path / "sampled"
-    package.mkdir()
+    kept = package / "__pycache__"
+    kept.mkdir(parents=True)
     (package / "__init__.py").touch()
+    (package / "kernel.py").write_text("kernel = None\n")
+    (package / "plain.py").write_text("x = 1\n")
+    (package / "inner.py").write_text("from sampled.kernel import kernel\n")
+    (package / "outer.py").write_text("from sampled.kernel import kernel\nfrom sampled.inner import kernel as k\n")
     (package / "warm_up.py").write_text(
         "def exercise():\n    with open(__file__ + '.log', 'a') as log:\n        log.write('.')\n"
     )
@@ -87,12 +92,23 @@ def test_kernels_are_stamped_once_and_again_when_a_source_changes(
     monkeypatch.setattr(launcher.kernels, "PACKAGES", ("sampled",))
     monkeypatch.setattr(launcher.kernels, "__file__", str(tmp_path / "launcher" / "kernels.py"))
     said: list[str] = []
-    assert launcher.kernels.warm_up(said.append)
-    assert not launcher.kernels.warm_up(said.append)
-    (package / "__pycache__").mkdir(exist_ok=True)
-    stale = package / "__pycache__" / "kernel.1.nbc"
-    stale.touch()
-    (package / "another.py").write_text("changed = True\n")
-    assert launcher.kernels.warm_up(said.append)
-    assert (len(said), stale.exists()) == (2, False)
-    assert (package / "warm_up.py.log").read_text() == ".."
+
+    def compiled_again() -> set[str]:
+        """Modules whose kept kernels are gone after the next warm-up."""
+        for module in ("inner", "outer"):
+            (kept / f"{module}.f-1.py311.nbi").touch()
+        launcher.kernels.warm_up(said.append)
+        return {module for module in ("inner", "outer") if not (kept / f"{module}.f-1.py311.nbi").exists()}
+
+    assert compiled_again() == {"inner", "outer"}
+    assert compiled_again() == set()
+    (package / "plain.py").write_text("x = 2\n")
+    assert compiled_again() == set()
+    (package / "outer.py").write_text("from sampled.kernel import kernel\nfrom sampled.inner import kernel as g\n")
+    assert compiled_again() == {"outer"}
+    (package / "inner.py").write_text("from sampled.kernel import kernel  # changed\n")
+    assert compiled_again() == {"inner", "outer"}
+    (kept / "kernels.json").write_text("cut sh")
+    assert compiled_again() == {"inner", "outer"}
+    assert len(said) == 4
+    assert (package / "warm_up.py.log").read_text() == "...."
