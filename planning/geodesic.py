@@ -47,8 +47,8 @@ class GeodesicMap:
         before[environment.successors] = vertices
         corners = np.stack([before, vertices, after], axis=1)[reflex]
         corners.flags.writeable = False
-        self._corners: Floats = corners
-        """(r, 3, 2): each reflex vertex between its neighbours."""
+        self.corners: Floats = corners
+        """(r, 3, 2) float, metres: each reflex vertex between its neighbours."""
 
     def path(self, p: ArrayLike, q: ArrayLike) -> Floats:
         """The shortest path from p to q, each (2,), metres: (m, 2), m ≥ 2, from p over the bends to q.
@@ -62,7 +62,7 @@ class GeodesicMap:
         _, first, last = self._search(start, end)
         bends = []
         while last >= 0:
-            bends.append(self._corners[last, 1])
+            bends.append(self.corners[last, 1])
             last = self._predecessors[first, last] if last != first else -1
         path = [start]
         for point in [*reversed(bends), end]:
@@ -86,11 +86,18 @@ class GeodesicMap:
         """
         start = self._read_point(p)
         ends = np.array(points, dtype=np.float64, order="C").reshape(-1, 2)
-        free = self.environment.contains(ends)
-        if not free.all():
-            raise self._refuse(ends[np.argmin(free)])
-        found: Floats = _find_lengths(start, ends, self._corners, self._distances, *self._space)
+        self.check_free(ends)
+        found: Floats = _find_lengths(start, ends, self.corners, self.corner_lengths, *self._space)
         return found
+
+    def check_free(self, points: Floats) -> None:
+        """Raise NotInFreeSpace, naming the first, if any of ``points`` (n, 2), metres, is no point of the environment.
+
+        O(n w).
+        """
+        free = self.environment.contains(points)
+        if not free.all():
+            raise self._refuse(points[np.argmin(free)])
 
     def nearest(self, p: ArrayLike) -> Floats:
         """The point of the environment nearest to p (2,), metres: p itself where it is inside. (2,) float. O(w)."""
@@ -105,12 +112,13 @@ class GeodesicMap:
     @cached_property
     def _all_pairs(self) -> tuple[Floats, Ints]:
         """Lengths and predecessors of the shortest paths between reflex vertices, both (r, r)."""
-        edges = _join_corners(self._corners, *self._space)
+        edges = _join_corners(self.corners, *self._space)
         distances, predecessors = dijkstra(csr_array(edges), directed=False, return_predecessors=True)
         return np.ascontiguousarray(distances), np.ascontiguousarray(predecessors)
 
     @property
-    def _distances(self) -> Floats:
+    def corner_lengths(self) -> Floats:
+        """(r, r) float, metres: shortest paths between reflex vertices. Computed when it is first asked for."""
         return self._all_pairs[0]
 
     @property
@@ -133,14 +141,14 @@ class GeodesicMap:
         """Length of the shortest path, and its first and last bend, −1 for none."""
         if free_points_see(start[0], start[1], end[0], end[1], *self._space):
             return math.dist(start, end), -1, -1
-        length, first, last = _find_bends(start, end, self._corners, self._distances, *self._space)
+        length, first, last = _find_bends(start, end, self.corners, self.corner_lengths, *self._space)
         if last < 0:
             raise ValueError("the free space of this environment is in several parts: build it with validate=True")
         return float(length), int(first), int(last)
 
 
 @kernel
-def _is_tangent(px: float, py: float, corners: Floats, i: int, tolerance: float) -> bool:
+def is_tangent(px: float, py: float, corners: Floats, i: int, tolerance: float) -> bool:
     """Whether the segment from p to reflex vertex i could go straight on: its neighbours lie on one side of the line.
 
     p is known to ± tolerance, so the line beyond the vertex is known the worse the nearer p is; in doubt the answer is
@@ -168,8 +176,8 @@ def _join_corners(corners: Floats, walls: Floats, tolerance: float) -> Floats:
         for j in range(i + 1, r):
             qx, qy = corners[j, 1, 0], corners[j, 1, 1]
             if (
-                _is_tangent(px, py, corners, j, tolerance)
-                and _is_tangent(qx, qy, corners, i, tolerance)
+                is_tangent(px, py, corners, j, tolerance)
+                and is_tangent(qx, qy, corners, i, tolerance)
                 and free_points_see(px, py, qx, qy, walls, tolerance)
             ):
                 edges[i, j] = edges[j, i] = math.hypot(qx - px, qy - py)
@@ -177,7 +185,7 @@ def _join_corners(corners: Floats, walls: Floats, tolerance: float) -> Floats:
 
 
 @kernel
-def _reach_corners(
+def reach_corners(
     start: Floats, corners: Floats, distances: Floats, walls: Floats, tolerance: float
 ) -> tuple[Floats, NDArray[np.int64]]:
     """Lengths (r,) of the shortest bent paths from a point to all reflex vertices, and the first bend of each."""
@@ -190,7 +198,7 @@ def _reach_corners(
         # A vertex that is reached no later over another one adds nothing.
         if (
             leg < reached[i]
-            and _is_tangent(start[0], start[1], corners, i, tolerance)
+            and is_tangent(start[0], start[1], corners, i, tolerance)
             and free_points_see(start[0], start[1], vx, vy, walls, tolerance)
         ):
             for j in range(r):
@@ -208,7 +216,7 @@ def _finish(end: Floats, reached: Floats, corners: Floats, walls: Floats, tolera
     """
     promised = np.empty(corners.shape[0])
     for j in range(corners.shape[0]):
-        if _is_tangent(end[0], end[1], corners, j, tolerance):
+        if is_tangent(end[0], end[1], corners, j, tolerance):
             promised[j] = reached[j] + math.hypot(end[0] - corners[j, 1, 0], end[1] - corners[j, 1, 1])
         else:
             promised[j] = np.inf
@@ -226,7 +234,7 @@ def _finish(end: Floats, reached: Floats, corners: Floats, walls: Floats, tolera
 def _find_bends(
     start: Floats, end: Floats, corners: Floats, distances: Floats, walls: Floats, tolerance: float
 ) -> tuple[float, int, int]:
-    reached, first = _reach_corners(start, corners, distances, walls, tolerance)
+    reached, first = reach_corners(start, corners, distances, walls, tolerance)
     length, last = _finish(end, reached, corners, walls, tolerance)
     return length, first[last] if last >= 0 else -1, last
 
@@ -235,7 +243,7 @@ def _find_bends(
 def _find_lengths(
     start: Floats, ends: Floats, corners: Floats, distances: Floats, walls: Floats, tolerance: float
 ) -> Floats:
-    reached, _ = _reach_corners(start, corners, distances, walls, tolerance)
+    reached, _ = reach_corners(start, corners, distances, walls, tolerance)
     lengths = np.empty(ends.shape[0])
     for k in range(ends.shape[0]):
         if free_points_see(start[0], start[1], ends[k, 0], ends[k, 1], walls, tolerance):
