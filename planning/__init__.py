@@ -17,11 +17,13 @@ if TYPE_CHECKING:
     from planning.environment import Environment
     from planning.geodesic import GeodesicMap
     from planning.mutual_visibility import mutual_visibility
+    from planning.placement_graph import PlacementGraph
 
 __all__ = [
     "Cells",
     "Environment",
     "GeodesicMap",
+    "PlacementGraph",
     "decompose",
     "mutual_visibility",
     "virtual_weights",
@@ -31,6 +33,7 @@ _HOMES = {
     "Cells": "planning.decomposition",
     "Environment": "planning.environment",
     "GeodesicMap": "planning.geodesic",
+    "PlacementGraph": "planning.placement_graph",
     "decompose": "planning.decomposition",
     "mutual_visibility": "planning.mutual_visibility",
     "virtual_weights": "planning.edge_weights",

@@ -17,6 +17,7 @@ def exercise() -> None:
     from planning.grid_outline import outline
     from planning.mutual_visibility import mutual_visibility
     from planning.placement import reachable_positions
+    from planning.placement_graph import PlacementGraph
     from planning.shortest_paths import all_pairs, from_source
 
     outline(np.ones((4, 4), dtype=np.bool_), np.ones((4, 4)), 1.0)
@@ -35,6 +36,9 @@ def exercise() -> None:
     geodesics.path(points[0], points[1])
     geodesics.lengths(points[0], points[1:])
     geodesics.nearest((-1.0, -1.0))
+    graph = PlacementGraph.from_points(rooms, 0.2, 2.0)
+    graph.distances_from(points[0])
+    _ = graph.distances
     for kind in ("inflection", "aspect"):
         cells = decompose(rooms, kind)
         cells.locate(points)
