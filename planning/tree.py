@@ -1,0 +1,119 @@
+"""Trees in a graph of placements: the value, and what is asked of the weights and terminals they are made from.
+
+A *placement* is where a member of the team can be: a cell, or a point with its field of view. Placements are the
+indices of W, the (N, N) weights of the direct links between them. *Terminals* are the placements that a tree has to
+join: those of the tracked agents and of the base station (thesis §3.3.3).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from planning.kernel import kernel
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+TILE = 32
+"""Rows and columns compared at once with their mirror image, so that both stay in the cache."""
+
+
+class InvalidWeights(ValueError):
+    """The weights are no symmetric matrix of numbers that are not negative; the text says where."""
+
+
+class InvalidTerminals(ValueError):
+    """The terminals, or what else is asked of a tree, make no sense for this graph; the text says which."""
+
+
+class NoTree(ValueError):
+    """No tree joins the terminals; the text names one that cannot be joined, or what is missing."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tree:
+    """A tree whose nodes stand in placements; ``cost`` is the sum of W[u, v] over its edges.
+
+    A Steiner tree of free size has distinct nodes: terminals in one placement are one node. A tree of fixed size has
+    as many nodes as were asked for, each terminal and each robot one, and several may share a placement; an edge
+    between two of those is (v, v) and costs 0.
+    """
+
+    cost: float
+    edges: Ints
+    """(n − 1, 2) int: pairs of placements, without direction."""
+    nodes: Ints
+    """(n,) int: placements; the terminals first, in the order they were given."""
+
+
+def checked_weights(W: ArrayLike) -> Floats:
+    """W as a C-contiguous (N, N) float array.
+
+    Args:
+        W: (N, N), symmetric, not negative; inf where there is no link. The diagonal is not looked at.
+
+    Raises:
+        InvalidWeights: it is not.
+
+    Complexity: O(N²).
+    """
+    try:
+        weights = np.ascontiguousarray(W, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InvalidWeights(f"edge weights form a matrix of numbers; this is {type(W).__name__}") from None
+    if weights.ndim != 2 or weights.shape[0] != weights.shape[1]:
+        raise InvalidWeights(f"edge weights form a square matrix, not one of shape {weights.shape}")
+    row, column = _fault(weights)
+    if row < 0:
+        return weights
+    weight, mirrored = weights[row, column], weights[column, row]
+    if weight == mirrored:
+        raise InvalidWeights(f"edge weights are not negative, but W[{row}, {column}] is {weight}")
+    if np.isnan(weight) or np.isnan(mirrored):
+        raise InvalidWeights(f"edge weights are numbers, but W[{row}, {column}] is {weight}: say inf for no link")
+    raise InvalidWeights(
+        f"edge weights are symmetric, but W[{row}, {column}] is {weight} and W[{column}, {row}] is {mirrored}: "
+        "take numpy.minimum(W, W.T) if either holds for both"
+    )
+
+
+def checked_terminals(terminals: ArrayLike, number: int) -> Ints:
+    """Terminals as (t,) int.
+
+    Args:
+        terminals: (t,) int, t ≥ 1: placements, which may repeat.
+        number: how many placements there are.
+
+    Raises:
+        InvalidTerminals: there is none, or one is no placement.
+    """
+    try:
+        given = np.asarray(terminals)
+    except ValueError:
+        given = np.empty((0, 0))
+    if given.ndim == 1 and len(given) == 0:
+        raise InvalidTerminals("a tree joins at least one terminal; none was given")
+    if given.ndim != 1 or given.dtype.kind not in "iu":
+        raise InvalidTerminals(f"terminals are a list of placements, which are whole numbers; this is {terminals!r}")
+    outside = np.flatnonzero((given < 0) | (given >= number))
+    if len(outside):
+        raise InvalidTerminals(
+            f"terminal {outside[0]} is placement {given[outside[0]]}, but the placements are 0 to {number - 1}"
+        )
+    return given.astype(np.int64)
+
+
+@kernel
+def _fault(W: Floats) -> tuple[int, int]:
+    """The place of a weight that is negative, no number, or not its mirror image; (-1, -1): there is none."""
+    number = len(W)
+    for top in range(0, number, TILE):
+        for left in range(top, number, TILE):
+            for row in range(top, min(top + TILE, number)):
+                for column in range(max(left, row + 1), min(left + TILE, number)):
+                    if not (W[row, column] >= 0.0 and W[row, column] == W[column, row]):
+                        return row, column
+    return -1, -1
