@@ -50,7 +50,7 @@ def choose_spacing(environment: Environment, free: Environment) -> float:
 
 
 def choose_points(environment: Environment, free: Environment, spacing_m: float) -> tuple[Floats, Bools]:
-    """Points and who sees whom: corners in the order of the walls of ``free``, then the grid, row by row from below.
+    """Points and who sees whom: corners in the order of the map's walls, then the grid, row by row from below.
 
     Args:
         environment: the map as drawn.
@@ -92,7 +92,7 @@ def _middles_of_arcs(environment: Environment, free: Environment) -> Floats:
         return np.empty((0, 2))
     _, vertices = KDTree(environment.reflex_vertices).query(corners)
     middles = []
-    for vertex in dict.fromkeys(vertices.tolist()):
+    for vertex in np.unique(vertices):
         arc = corners[vertices == vertex]
         # Rounding must not choose between two that are equally near to the middle.
         apart = np.hypot(*(arc - arc.mean(axis=0)).T)
