@@ -184,11 +184,10 @@ def test_points_move_with_the_map(scale: float, offset: float) -> None:
         scale * environment.outer + offset, [scale * hole + offset for hole in environment.holes], "moved"
     )
     here, there = PlacementGraph.from_points(environment, 0.2), PlacementGraph.from_points(moved, 0.2 * scale)
-    assert there.positions == pytest.approx(scale * here.positions + offset, abs=1e-6 * scale)
+    np.testing.assert_allclose(there.positions, scale * here.positions + offset, rtol=0.0, atol=1e-6 * scale)
     np.testing.assert_array_equal(there.visible, here.visible)
-    assert there.distances == pytest.approx(scale * here.distances, abs=1e-5 * scale)
-    finite = here.visible
-    assert there.weights[finite] == pytest.approx(here.weights[finite], abs=1e-6)
+    np.testing.assert_allclose(there.distances, scale * here.distances, rtol=0.0, atol=1e-5 * scale)
+    np.testing.assert_allclose(there.weights, here.weights, rtol=0.0, atol=1e-6)
 
 
 def test_equal_maps_have_equal_graphs() -> None:
