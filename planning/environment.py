@@ -213,9 +213,9 @@ class Environment:
 
     @classmethod
     def load(cls, path: str | Path, containing: ArrayLike | None = None) -> Environment:
-        """Read a map: polygons in ``.json`` or ``.geojson``, or a ROS occupancy grid by its ``.yaml``.
+        """Read a map: polygons in ``.json``, ``.geojson`` or ``.wkt``, or a ROS occupancy grid by its ``.yaml``.
 
-        Coordinates are metres in a local frame, in GeoJSON too.
+        Coordinates are metres in a local frame, in GeoJSON and WKT too.
 
         Args:
             path: the file.

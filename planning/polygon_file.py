@@ -1,8 +1,9 @@
-"""Polygon maps as files: the project's JSON, and GeoJSON.
+"""Polygon maps as files: the project's JSON, GeoJSON and well-known text (WKT).
 
 The project's JSON is ``{"name", "units": "metres", "outer", "holes", "source"}`` with rings as lists of [x, y]. GeoJSON
 may be a Polygon, MultiPolygon, GeometryCollection, Feature or FeatureCollection; its coordinates are taken as **metres
-in a local frame**, not as longitude and latitude, so a file that names a geographic coordinate system is refused.
+in a local frame**, not as longitude and latitude, so a file that names a geographic coordinate system is refused. WKT
+is treated alike, polygons of several geometries included.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from planning.line_of_sight import point_is_free
 from planning.polygon_validation import InvalidEnvironment, read_ring, signed_area
+from planning.well_known_text import BadText, is_well_known_text, parse
 
 Floats = NDArray[np.float64]
 
@@ -33,7 +35,7 @@ _GEOGRAPHIC_EPSG = frozenset(
 )
 _EPSG = re.compile(r"EPSG:+(?:[\d.]*:)?(\d+)", re.IGNORECASE)
 
-_FORMATS = "name a .json or .geojson file with polygons, or the .yaml of an occupancy grid"
+_FORMATS = "name a .json, .geojson or .wkt file with polygons, or the .yaml of an occupancy grid"
 
 
 class UnreadableMap(ValueError):
@@ -54,23 +56,27 @@ def read_polygon_file(path: Path, containing: Floats | None = None) -> PolygonMa
     """Read a polygon map.
 
     Args:
-        path: ``.json`` or ``.geojson``; what is inside decides, not the suffix.
-        containing: (2,) metres: of several GeoJSON polygons take the one that holds this point, else the largest.
+        path: ``.json``, ``.geojson`` or ``.wkt``; what is inside decides, not the suffix.
+        containing: (2,) metres: of several polygons take the one that holds this point, else the largest.
 
     Raises:
-        UnreadableMap: the file is absent, unreadable, neither form, or not in metres.
+        UnreadableMap: the file is absent, unreadable, none of the forms, or not in metres.
     """
     try:
-        content = _read_json(path)
+        text = _read_text(path)
+        if path.suffix.lower() == ".wkt" or is_well_known_text(text):
+            return _choose_polygon(path, _find_in_text(path, text), containing)
+        content = _parse_json(path, text)
         if not isinstance(content, dict):
             raise UnreadableMap(
                 f'{path}: the file holds no JSON object: expected {{"outer": [[x, y], ...], ...}} or GeoJSON'
             )
         if "type" in content and "outer" not in content:
-            return _choose_polygon(path, content, containing)
+            _refuse_degrees(path, content)
+            return _choose_polygon(path, list(_find_polygons(path, content, path.stem)), containing)
         return _read_project_map(path, content)
     except RecursionError:
-        raise UnreadableMap(f"{path}: its lists are nested too deeply for a map: rings are lists of [x, y]") from None
+        raise UnreadableMap(f"{path}: its lists are nested too deeply for a map: rings are lists of points") from None
 
 
 def write_polygon_file(path: Path, name: str, outer: Floats, holes: Sequence[Floats], source: str) -> None:
@@ -95,9 +101,9 @@ def write_polygon_file(path: Path, name: str, outer: Floats, holes: Sequence[Flo
         raise
 
 
-def _read_json(path: Path) -> Any:
+def _read_text(path: Path) -> str:
     try:
-        return json.loads(path.read_text(encoding="utf-8-sig"))
+        return path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
         raise UnreadableMap(f"{path}: no such map file: check the path") from None
     except IsADirectoryError:
@@ -106,6 +112,11 @@ def _read_json(path: Path) -> Any:
         raise UnreadableMap(f"{path}: cannot be read ({error.strerror}): check its permissions") from None
     except UnicodeDecodeError:
         raise UnreadableMap(f"{path}: this is not text: {_FORMATS}") from None
+
+
+def _parse_json(path: Path, text: str) -> Any:
+    try:
+        return json.loads(text)
     except json.JSONDecodeError as error:
         if path.suffix.lower() not in {".json", ".geojson"}:
             raise UnreadableMap(f"{path}: this is no map: {_FORMATS}") from None
@@ -136,16 +147,33 @@ def _read_project_map(path: Path, content: dict[str, Any]) -> PolygonMap:
     return PolygonMap(name, content["outer"], tuple(holes), source)
 
 
-def _choose_polygon(path: Path, content: dict[str, Any], containing: Floats | None) -> PolygonMap:
+def _find_in_text(path: Path, text: str) -> list[PolygonMap]:
+    """All polygons of a file of well-known text."""
+    try:
+        found = parse(text)
+    except BadText as error:
+        raise UnreadableMap(f"{path}: {error}") from None
+    if not _GEOGRAPHIC_EPSG.isdisjoint(found.reference_systems):
+        raise UnreadableMap(
+            f'{path}: its "SRID" is geographic (degrees): project it to a local frame in metres, then remove "SRID"'
+        )
+    return [PolygonMap(path.stem, rings[0], tuple(rings[1:]), "") for rings in found.polygons]
+
+
+def _refuse_degrees(path: Path, content: dict[str, Any]) -> None:
+    """Refuse GeoJSON that names a geographic coordinate system."""
     crs = json.dumps(content.get("crs"))
     code = _EPSG.search(crs)
     if _GEOGRAPHIC_NAME.search(crs) or (code and int(code[1]) in _GEOGRAPHIC_EPSG):
         raise UnreadableMap(
             f'{path}: its "crs" is geographic (degrees): project it to a local frame in metres, then remove "crs"'
         )
-    candidates = list(_find_polygons(path, content, path.stem))
+
+
+def _choose_polygon(path: Path, candidates: Sequence[PolygonMap], containing: Floats | None) -> PolygonMap:
+    """The polygon that holds the point, or the largest."""
     if not candidates:
-        raise UnreadableMap(f"{path}: this GeoJSON holds no Polygon or MultiPolygon: draw the free space as a polygon")
+        raise UnreadableMap(f"{path}: it holds no Polygon or MultiPolygon: draw the free space as a polygon")
     if len(candidates) == 1:
         return candidates[0]
     measured = [(_measure(path, candidate, containing), candidate) for candidate in candidates]

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import shapely
 
 from planning.environment import Environment
 from planning.polygon_file import UnreadableMap
@@ -182,7 +183,7 @@ def test_invalid_rings_name_the_file(tmp_path: Path, content: object, sentence: 
 
 @pytest.mark.parametrize("name", ["map.txt", "map", "map.pgm"])
 def test_what_is_no_map_by_name_and_content_is_told_the_formats(tmp_path: Path, name: str) -> None:
-    with pytest.raises(UnreadableMap, match=r"this is no map: name a .json or .geojson file .*\.yaml"):
+    with pytest.raises(UnreadableMap, match=r"this is no map: name a .json, .geojson or .wkt file .*\.yaml"):
         Environment.load(write(tmp_path, "P2 2 2 255", name))
     assert Environment.load(write(tmp_path, {"outer": SQUARE}, name)).area == 100.0
 
@@ -227,3 +228,95 @@ def test_shared_thesis_maps_load() -> None:
         environment = Environment.load(path)
         assert environment.name == path.stem
         assert environment.area == pytest.approx(environment.polygon.area)
+
+
+WKT_SQUARE = "((0 0, 10 0, 10 10, 0 10, 0 0), (4 4, 6 4, 6 6, 4 6, 4 4))"
+WKT_SMALL = "((20 0, 23 0, 23 3, 20 3, 20 0))"
+
+
+@pytest.mark.parametrize(
+    ("text", "area"),
+    [
+        (f"POLYGON {WKT_SQUARE}", 96.0),
+        (f"polygon{WKT_SQUARE}\n", 96.0),
+        ("Polygon Z ((0 0 7, 1e1 0 7, 10. +10 7, .0 10 7))", 100.0),
+        ("POLYGONZM((0 0 7 1, 10 0 7 1, 10 10 7 1, 0 10 7 1, 0 0 7 1))", 100.0),
+        ("POLYGON M ((0 0 7,10 0 7,10 10 7,0 10 7,0 0 7))", 100.0),
+        (f"SRID=25832;POLYGON {WKT_SMALL}", 9.0),
+        (f"MULTIPOLYGON ({WKT_SMALL},\n  {WKT_SQUARE})", 96.0),
+        (f"MULTIPOLYGON (EMPTY, {WKT_SMALL})", 9.0),
+        (
+            f"GEOMETRYCOLLECTION (POINT (1 2), MULTIPOINT ((1 2), (3 4)), LINESTRING EMPTY, POLYGON EMPTY, "
+            f"GEOMETRYCOLLECTION (POLYGON {WKT_SMALL}))",
+            9.0,
+        ),
+        (f"POLYGON {WKT_SMALL}\nPOLYGON {WKT_SQUARE}\n", 96.0),
+        (f"POLYGON {WKT_SMALL};\nLINESTRING (0 0, 1 1);\n", 9.0),
+    ],
+)
+def test_wkt_forms(tmp_path: Path, text: str, area: float) -> None:
+    for name in ("hall.wkt", "hall.txt"):
+        environment = Environment.load(write(tmp_path, text, name))
+        assert environment.name == "hall"
+        assert environment.area == pytest.approx(area)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_wkt_as_another_library_writes_it_reads_back(tmp_path: Path, seed: int) -> None:
+    drawn = environment_of(seed)
+    far = shapely.box(100.0, 0.0, 101.0, 1.0)
+    for geometry in (drawn.polygon, shapely.MultiPolygon([far, drawn.polygon]), shapely.force_3d(drawn.polygon, 2.0)):
+        path = write(tmp_path, shapely.to_wkt(geometry, rounding_precision=-1), "map.wkt")
+        environment = Environment.load(path, containing=drawn.vertices[0])
+        again, once = shapely.normalize(environment.polygon), shapely.normalize(drawn.polygon)
+        assert shapely.equals_exact(again, once, tolerance=1e-14)  # it writes 16 digits
+
+
+def test_wkt_component_that_holds_a_point(tmp_path: Path) -> None:
+    path = write(tmp_path, f"MULTIPOLYGON ({WKT_SQUARE}, {WKT_SMALL})", "map.wkt")
+    assert Environment.load(path, containing=(21, 1)).area == pytest.approx(9.0)
+    assert Environment.load(path, containing=(1, 1)).area == pytest.approx(96.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("", r"holds no Polygon or MultiPolygon"),
+        ("LINESTRING (0 0, 1 1)", r"holds no Polygon or MultiPolygon"),
+        ("POLYGON EMPTY", r"holds no Polygon or MultiPolygon"),
+        ("hello", r"bad WKT at line 1, column 1: expected the name of a geometry such as POLYGON and found 'hello'"),
+        ("POLYGON", r"bad WKT at line 1, column 8: expected '\(' and found the end of the text: correct it there"),
+        ("POLYGON ((0 0, 1 0,\n 1 x))", r"bad WKT at line 2, column 4: expected a number and found 'x\)\)'"),
+        ("POLYGON ((0 0, 1 0, 1 1)", r"line 1, column 25: expected ',' or '\)' and found the end"),
+        ("POLYGON ((0 0, 1 0, 1 1)))", r"column 26: expected the name of a geometry such as POLYGON and found '\)'"),
+        ("POLYGON ((0 0, 1 nan, 1 1))", r"column 18: expected a number and found 'nan"),
+        ("POLYGON ((0 0, 1 0 0 0 0, 1 1))", r"column 24: expected ',' or '\)'"),
+        ("POLYGON ((0 0, 1 0, #))", r"column 21: expected a word, a number or a bracket and found '#\)\)'"),
+        ("POINT (0 0", r"expected '\)' and found the end"),
+        ("CURVEPOLYGON ((0 0, 1 0, 1 1))", r"expected the name of a geometry such as POLYGON"),
+        ("SRID=;POLYGON EMPTY", r"column 6: expected a number"),
+        ("SRID=4326;POLYGON ((0 0, 1 0, 1 1))", r'its "SRID" is geographic \(degrees\)'),
+        ("GEOMETRYCOLLECTION (" * 5000, r"nested too deeply"),
+    ],
+)
+def test_unreadable_wkt_says_what_to_do(tmp_path: Path, text: str, sentence: str) -> None:
+    path = write(tmp_path, text, "map.wkt")
+    with pytest.raises(UnreadableMap, match=sentence) as refusal:
+        Environment.load(path)
+    assert str(refusal.value).startswith(f"{path}: ")
+    assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("POLYGON ((0 0, 1 0))", r"the outer ring has 2 point\(s\): a ring needs at least 3"),
+        ("POLYGON ((0 0, 1e999 0, 1 1))", r"not a finite number at its point 2"),
+        ("POLYGON ((0 0, 10 10, 10 0, 0 10))", r"the outer ring crosses itself"),
+    ],
+)
+def test_invalid_wkt_rings_name_the_file(tmp_path: Path, text: str, sentence: str) -> None:
+    path = write(tmp_path, text, "map.wkt")
+    with pytest.raises(InvalidEnvironment, match=sentence) as refusal:
+        Environment.load(path)
+    assert str(refusal.value).startswith(f"{path}: ")
