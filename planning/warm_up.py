@@ -16,6 +16,7 @@ def exercise() -> None:
     from planning.geodesic import GeodesicMap
     from planning.grid_outline import outline
     from planning.mutual_visibility import mutual_visibility
+    from planning.ordered_chain import search_in_order
     from planning.placement import reachable_positions
     from planning.placement_graph import PlacementGraph
     from planning.shortest_paths import all_pairs, from_source
@@ -46,4 +47,5 @@ def exercise() -> None:
         all_pairs(weights)
         from_source(weights, 0)
         cheapest_chain(weights, np.ones((2, len(weights))), weights[0], weights[-1], 1.0)
+        search_in_order(weights, np.ones((2, len(weights))), weights[0], weights[-1])
         reachable_positions(cells, free)
