@@ -10,7 +10,7 @@ of, hung by one edge:
 
 C_i(u) is what it costs that node i goes to u. Every tree can be taken apart in this way, and all that is put together
 is a tree; so min over v of C_r(v) + F[all but r](v), with any node r as the root of the whole, is the optimum over all
-topologies. Because F does not say which node stands in v, this is a factor k cheaper than keeping a table for each root.
+topologies. As F does not say which node stands in v, this is a factor k cheaper than keeping a table for each root.
 
 Nodes with the same costs need no names. A *kind* is a number of nodes with the same C; sets become counts of each kind,
 and Π(n_i + 1) of those stand for 2^(k−1) sets. Robots that start from one place are one kind. The same programme with
@@ -115,24 +115,23 @@ def states_of(numbers: list[int]) -> int:
 
 
 def solve_subsets(
-    links: Links, root_costs: Floats, costs: Floats, numbers: list[int], needed: list[bool] | None = None
+    links: Links, root_costs: Floats, costs: Floats, numbers: list[int], needed: list[bool]
 ) -> SubsetProgramme:
     """Solve the programme.
 
     Args:
         links: of N placements.
         root_costs: (N,) float: C of the root, a node that is always needed.
-        costs: (c, N) float: C of each kind but the root; inf where it cannot go. Not negative where ``needed`` is given.
+        costs: (c, N) float: C of each kind but the root; inf where it cannot go. Not negative for what is not needed.
         numbers: how many nodes of each kind there are.
         needed: whether the nodes of each kind all have to be in the tree; of the others any number may be left out.
-            None: all nodes have to be in it.
 
     Complexity: O(3^(k−1) N + 2^(k−1) (k N + N²)) time and O(2^k N) memory for k nodes of as many kinds; less where
     kinds have several nodes.
     """
     counts = np.indices([number + 1 for number in numbers]).reshape(len(numbers), states_of(numbers)).T.astype(np.int64)
     strides = np.array([states_of(numbers[kind + 1 :]) for kind in range(len(numbers))], dtype=np.int64)
-    wanted = np.ones(len(numbers), dtype=np.bool_) if needed is None else np.array(needed, dtype=np.bool_)
+    wanted = np.array(needed, dtype=np.bool_)
     sizes = np.where(counts[:, wanted].any(axis=1), counts.sum(axis=1), 0)
 
     hanging, branches = np.full((len(counts), links.number), np.inf), np.full((len(counts), links.number), np.inf)
