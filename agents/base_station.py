@@ -198,7 +198,9 @@ class BaseStation:
             decision=self._decisions,
             placements=plan.placements,
             edges=plan.edges,
-            cost=plan.cost if math.isfinite(plan.cost) else 0.0,  # JSON has no infinity; no chain has no edges
+            cost=_finite(plan.cost) or 0.0,
+            total_cost_m=_finite(plan.total_cost_m),
+            lower_bound_m=_finite(plan.lower_bound_m),
             relays_needed=plan.relays_needed,
             reason=plan.reason[:500] if decides or self._said is None else self._said.reason,
         )
@@ -266,6 +268,11 @@ class BaseStation:
 
     def _log(self, level: Literal["info", "warning", "error"], text: str) -> None:
         self._effects.append(Record(LogLine(level=level, text=text)))
+
+
+def _finite(number: float | None) -> float | None:
+    """The number, or None: JSON has no infinity."""
+    return number if number is not None and math.isfinite(number) else None
 
 
 def _choice(plan: Plan) -> tuple[object, ...]:

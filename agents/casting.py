@@ -78,6 +78,9 @@ class Casting:
             mission.base_station.start,
             mission.robot_radius_m,
             mission.decomposition,
+            placements=mission.placements,
+            search=mission.search,
+            spacing_m=mission.spacing_m,
             base_name=mission.base_station.name,
             agent_name=mission.tracked_agent.name,
             robot_speed_m_s=mission.robot_speed_m_s,
@@ -100,10 +103,3 @@ class Casting:
         routes = GeodesicMap(free)
         self._routes.append((free, routes))
         return routes
-
-
-def cast(
-    mission: Mission, name: str, environment: Environment, planner: DeploymentPlanner | None = None
-) -> tuple[Role, DiscDriver]:
-    """Role and body of one peer; see :class:`Casting`."""
-    return Casting(mission, environment, planner).cast(name)

@@ -75,6 +75,12 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     seed: int
     epoch_unix_s: float
     """Wall clock at mission time zero."""
+    placements: Literal["cells", "points"] = "points"
+    """What relays stand at (:mod:`planning.placement_graph`)."""
+    spacing_m: float | None = None
+    """Of the grid of points; None: one that suits the map."""
+    search: Literal["chain", "exact", "one-edge", "fixed"] = "chain"
+    """How the leader finds chains (:mod:`agents.proposals`)."""
     planning_delay_s: float = 0.02
     """In simulation: modelled duration of a planning job."""
 

@@ -7,7 +7,7 @@ programs. And it is drawn, for the eye:
 entity                  what is there
 ======================  ==============================================================================
 ``world``               mirrors the map frame (y up) into the viewer's (y down); holds all that follows
-``world/map/...``       ``free`` (picture), ``cells``, ``walls``; static
+``world/map/...``       ``free`` (picture), ``cells``, ``placements``, ``walls``; static
 ``world/sight``         all lines of sight between peers
 ``world/chain/...``     links of the current deployment tree: ``in_sight``, ``broken``
 ``world/peers/...``     ``<peer>/body`` (dot, true disc, velocity), ``/trail``, ``/path``, ``/target``
@@ -15,6 +15,7 @@ entity                  what is there
 ``connected``           agent visible, chain connected, team connected: 0 or 1 each
 ``lambda2``             algebraic connectivity of the team's visibility graph
 ``planning_ms``         how long each planning job took
+``cost``                of each decision, and its lower bound, metres
 ``mode/<peer>``         what the peer's body does
 ``log/<peer>``          log lines, and the leader's decisions with their reasons
 ======================  ==============================================================================
@@ -39,7 +40,7 @@ from numpy.typing import NDArray
 
 from agents.map_picture import OBSTACLE, draw_map
 from agents.mission import Mission
-from agents.records import AnyRecord, Connectivity, Decision, LogLine, Planned, Track
+from agents.records import AnyRecord, Connectivity, Decision, LogLine, Planned, Track, in_words
 from agents.tree_layout import lay_out
 from protocol.messages import Point
 
@@ -61,6 +62,7 @@ _ROLE_COLOURS = {"base_station": _BASE_STATION, "robot": _ROBOT, "tracked_agent"
 _WALL, _CELL, _SIGHT = 0xB9C2D0FF, 0x8A94A638, 0xC8D2E070
 _IN_SIGHT, _OUT_OF_SIGHT = 0x5BE08AFF, 0xFF4D4DFF
 _MODES = {"waiting": 0x7A8290FF, "moving": 0x4DB8FFFF, "arrived": 0x5BE08AFF, "holding": 0xF5B83DFF}
+_SERIES = {"connected": ["agent visible", "chain", "team"], "cost": ["cost", "lower bound"]}
 _LEVELS = {
     "debug": rr.TextLogLevel.DEBUG,
     "info": rr.TextLogLevel.INFO,
@@ -124,12 +126,18 @@ class RerunRecorder:
         self._rows: dict[tuple[str, _Columns], list[tuple[int, Any]]] = {}
         self._flushed_at = time.monotonic()
 
-    def log_map(self, environment: Environment, cell_polygons: Sequence[NDArray[np.float64]] = ()) -> None:
+    def log_map(
+        self,
+        environment: Environment,
+        cell_polygons: Sequence[NDArray[np.float64]] = (),
+        placements: NDArray[np.float64] | None = None,
+    ) -> None:
         """Draw the map, once; called by one process of the team.
 
         Args:
             environment: the map.
             cell_polygons: (m, 2) float rings, metres, map frame.
+            placements: (n, 2) float, metres, map frame: where relays can be sent.
         """
         self._bounds = environment.bounds
         picture = draw_map(environment, cell_polygons)
@@ -144,6 +152,8 @@ class RerunRecorder:
         if len(cell_polygons):
             outlines = [np.vstack([ring, ring[:1]]) for ring in cell_polygons]
             self._static("world/map/cells", rr.LineStrips2D(outlines, colors=_CELL, radii=-0.5, draw_order=-10.0))
+        if placements is not None:
+            self._static("world/map/placements", rr.Points2D(placements, colors=_CELL, radii=-1.5, draw_order=-8.0))
         rings = [np.vstack([ring, ring[:1]]) for ring in (environment.outer, *environment.holes)]
         self._static("world/map/walls", rr.LineStrips2D(rings, colors=_WALL, radii=-1.0, draw_order=-5.0))
 
@@ -159,13 +169,14 @@ class RerunRecorder:
             ("connected", [_AGENT, _IN_SIGHT, _ROBOT], [6.0, 3.5, 1.5]),  # later ones are drawn over earlier ones
             ("lambda2", [_ROBOT], [1.5]),
             ("planning_ms", [_BASE_STATION], [1.5]),
+            ("cost", [_BASE_STATION, _IN_SIGHT], [3.0, 1.5]),
         ):
             self._static(
                 entity,
                 rr.SeriesLines(
                     colors=np.array(colours, dtype=np.uint32),
                     widths=widths,
-                    names=["agent visible", "chain", "team"] if len(colours) > 1 else entity,
+                    names=_SERIES.get(entity, entity),
                     interpolation_mode=rr.components.InterpolationMode.StepAfter,
                 ),
             )
@@ -188,7 +199,7 @@ class RerunRecorder:
             case Track():
                 self._draw_track(now_ns, peer, record)
             case Decision():
-                self._draw_decision(peer, record)
+                self._draw_decision(now_ns, peer, record)
             case Connectivity():
                 self._draw_connectivity(now_ns, record)
             case Planned():
@@ -249,7 +260,7 @@ class RerunRecorder:
             sizes = [(track.radius_m, track.radius_m)] * len(centres)
             self._log(f"{home}/target", rr.Ellipses2D.from_fields(centers=centres, half_sizes=sizes))
 
-    def _draw_decision(self, peer: str, decision: Decision) -> None:
+    def _draw_decision(self, now_ns: int, peer: str, decision: Decision) -> None:
         deployment = decision.deployment
         robots = [placement.robot for placement in deployment.placements]
         root = next((name for name, role in self._roles.items() if role == "base_station"), peer)
@@ -268,7 +279,11 @@ class RerunRecorder:
         )
         change = "new tree" if decision.topology_changed else "same tree"
         what = f"decision {deployment.decision} ({change}, {1e3 * decision.planning_s:.0f} ms)"
-        self._log(f"log/{peer}", rr.TextLog(f"{peer}: {what}: {deployment.reason}", level=rr.TextLogLevel.INFO))
+        worth = in_words(deployment)
+        said = f"{peer}: {what}: {deployment.reason}" + (f"; {worth}" if worth else "")
+        self._log(f"log/{peer}", rr.TextLog(said, level=rr.TextLogLevel.INFO))
+        if deployment.total_cost_m is not None and deployment.lower_bound_m is not None:
+            self._gather(now_ns, "cost", _scalar_columns, [deployment.total_cost_m, deployment.lower_bound_m])
 
     def _draw_connectivity(self, now_ns: int, connectivity: Connectivity) -> None:
         in_sight = {frozenset(link) for link in connectivity.links}
@@ -341,7 +356,11 @@ def _layout(mission: Mission, bounds: tuple[float, float, float, float] | None) 
     )
     curves = [
         rrb.TimeSeriesView(origin=f"/{entity}", name=name, plot_legend=rrb.PlotLegend(visible=False))
-        for entity, name in (("lambda2", "λ2 of the team"), ("planning_ms", "Planning time [ms]"))
+        for entity, name in (
+            ("lambda2", "λ2 of the team"),
+            ("planning_ms", "Planning time [ms]"),
+            ("cost", "Cost of the decision (amber) and its lower bound (green) [m]"),
+        )
     ]
     return rrb.Blueprint(
         rrb.Horizontal(

@@ -35,6 +35,16 @@ class Decision(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", ta
     """Whether the tree's edges differ from those of the decision before."""
 
 
+def in_words(deployment: Deployment) -> str:
+    """What a deployment costs and could cost at least; empty without a chain."""
+    cost_m, bound_m = deployment.total_cost_m, deployment.lower_bound_m
+    if cost_m is None or bound_m is None:
+        return ""
+    if bound_m >= cost_m:
+        return f"costs {cost_m:.1f} m, the least"
+    return f"costs {cost_m:.1f} m, at least {bound_m:.1f} m were needed"
+
+
 class Planned(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag="planned"):
     """A planning job has ended, whatever came of it."""
 

@@ -27,6 +27,7 @@ from queue import SimpleQueue
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
+    from agents.casting import Casting
     from agents.leader import DeploymentPlanner
     from agents.mission import Mission
     from agents.recorder import RerunRecorder
@@ -126,7 +127,7 @@ def live(
         ending: says when it is time.
         planner: of the team, if there is one already.
     """
-    from agents.casting import cast
+    from agents.casting import Casting
     from agents.records import LogLine
     from agents.role import JobDone
     from agents.shell import PeerShell
@@ -141,9 +142,10 @@ def live(
         return time.monotonic() - epoch_monotonic_s
 
     environment = Environment.load(folder / mission.map_path)
-    role, driver = cast(mission, name, environment, planner)
+    casting = Casting(mission, environment, planner)
+    role, driver = casting.cast(name)
     file = folder / "recordings" / f"{name}.{incarnation}.rrd"
-    recorder = _open_recorder(file, mission, folder.name, name, environment)
+    recorder = _open_recorder(file, mission, folder.name, name, environment, casting)
 
     def record(time_s: float, what: AnyRecord) -> None:
         recorder.record(time_s, name, what)
@@ -199,15 +201,16 @@ def _read_mission(file: Path, name: str, position: str | None) -> Mission:
     return structs.replace(mission, roster=tuple(moved if entry.name == name else entry for entry in mission.roster))
 
 
-def _open_recorder(file: Path, mission: Mission, run: str, name: str, environment: Environment) -> RerunRecorder:
+def _open_recorder(
+    file: Path, mission: Mission, run: str, name: str, environment: Environment, casting: Casting
+) -> RerunRecorder:
     """The recorder of a peer; that of the base station draws the map and says how the recording opens."""
     from agents.recorder import RerunRecorder
 
     recorder = RerunRecorder(file, team=mission.team, recording_id=run, peer=name)
     if mission.entry(name).role == "base_station":
-        from planning.decomposition import decompose
-
-        recorder.log_map(environment, decompose(environment, mission.decomposition).polygons)
+        graph = casting.planner().graph
+        recorder.log_map(environment, graph.outlines, graph.positions)
         recorder.log_blueprint(mission)
     return recorder
 

@@ -20,6 +20,7 @@ from launcher.scenario import Scenario, ScenarioFault, find_map, read_scenario
 from launcher.wording import counted, text_of
 from planning.deployment import NoChain
 from planning.environment import Environment
+from planning.placement_points import UnfitSpacing
 from protocol.messages import Point
 
 BASE = "base"
@@ -76,6 +77,8 @@ def prepare(file: Path, announce: Callable[[str], None]) -> Preparation:
         planner = Casting(mission, environment).planner()
     except TooManyCells as problem:
         raise ScenarioFault(f"{file}: map: {problem}") from problem
+    except UnfitSpacing as problem:
+        raise ScenarioFault(f"{file}: planning.spacing_m: {problem}") from problem
     warnings = _check_robots_suffice(file, scenario, planner)
     return Preparation(scenario, environment, mission, planner, warnings)
 
@@ -139,6 +142,9 @@ def _mission(scenario: Scenario, starts: tuple[Point, ...]) -> Mission:
         planning_period_s=scenario.planning.period_s,
         valid_for_s=scenario.planning.valid_for_s,
         decomposition=scenario.planning.decomposition,
+        placements=scenario.planning.placements,
+        spacing_m=scenario.planning.spacing_m,
+        search=scenario.planning.search,
         duration_s=scenario.duration_s,
         seed=scenario.seed,
         epoch_unix_s=0.0,

@@ -86,7 +86,14 @@ class Rates(_Table, frozen=True, kw_only=True):
 class Planning(_Table, frozen=True, kw_only=True):
     """``[planning]``: how the leader plans."""
 
+    placements: Literal["cells", "points"] = "points"
+    """``cells``: relays stand in cells that wholly see each other; ``points``: at corners and on a grid."""
+    spacing_m: Metres | None = None
+    """Of the grid of points; without it one that suits the map."""
     decomposition: Literal["inflection", "aspect"] = "inflection"
+    """Kind of cells."""
+    search: Literal["chain", "exact", "one-edge", "fixed"] = "chain"
+    """How the leader finds chains."""
     period_s: Annotated[float, Meta(ge=0.05, le=86400)] = 0.5
     valid_for_s: Annotated[float, Meta(ge=0.2, le=86400)] = 3.0
 
@@ -253,6 +260,8 @@ def _contradiction(scenario: Scenario) -> str:
     if len(robots.starts) > MOST_ROBOTS:
         return f"robots.starts has {len(robots.starts)} places; a team has at most {MOST_ROBOTS} robots"
     planning, control_s = scenario.planning, 1 / scenario.rates.control_hz
+    if planning.spacing_m is not None and planning.placements == "cells":
+        return "planning.spacing_m is given and planning.placements is 'cells'; only points are on a grid, remove one"
     for least_s, what in ((2 * planning.period_s, "two planning"), (REPETITIONS * control_s, "four control")):
         if planning.valid_for_s < least_s:
             return (

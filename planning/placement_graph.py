@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, Literal, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from planning.deployment import NO_CHAIN
 from planning.edge_weights import NORMALISED_PENALTY, virtual_weights
 from planning.environment import Environment
 from planning.geodesic import GeodesicMap
@@ -41,9 +42,6 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-NO_CHAIN = -1
-"""In counts of relays: no number of relays makes a chain."""
-
 
 class NoPlacement(ValueError):
     """A robot of this radius can stand in none of the cells."""
@@ -58,6 +56,14 @@ class Sight(Protocol):
     def direct(self, p: Floats, points: Floats) -> Floats:
         """Weights of the links between p (2,) and points (m, 2): (m,), inf where there is none."""
 
+    @property
+    def probes(self) -> Floats:
+        """Places that stand for all others: (m, 2)."""
+
+    @property
+    def outlines(self) -> tuple[Floats, ...]:
+        """Polygons that tile the map."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PlacementGraph:
@@ -66,7 +72,8 @@ class PlacementGraph:
     Attributes:
         kind: ``"cells"`` or ``"points"``.
         environment: the map as drawn; robots see through it.
-        free: that map inflated by the robot's radius: where its centre can be. One component.
+        radius_m: of the robots, metres.
+        free: the map inflated by that radius: where a robot's centre can be. One component.
         positions: (N, 2) float, metres, map frame, all in ``free``.
         visible: (N, N) bool, symmetric, True on the diagonal.
         weights: (N, N) float, symmetric, without unit: of the links (see the module), inf where two placements do not
@@ -76,6 +83,7 @@ class PlacementGraph:
 
     kind: Literal["cells", "points"]
     environment: Environment
+    radius_m: float
     free: Environment
     positions: Floats
     visible: Bools
@@ -122,7 +130,7 @@ class PlacementGraph:
         weights = virtual_weights(cells, seen)
         among = np.ascontiguousarray(weights[np.ix_(kept, kept)])
         return cls(
-            "cells", environment, free, positions[kept], np.isfinite(among), among, kept,
+            "cells", environment, radius_m, free, positions[kept], np.isfinite(among), among, kept,
             _CellSight(cells, weights, kept),
         )  # fmt: skip
 
@@ -156,10 +164,15 @@ class PlacementGraph:
         )
         distances = np.hypot(*(points[:, None] - points).transpose(2, 0, 1))
         # A single placement has no link to measure by.
-        sight = _PointSight(environment, points, float(distances[visible].max()) or 1.0)
+        sight = _PointSight(environment, free, points, float(distances[visible].max()) or 1.0)
         weights = np.where(visible, sight.weigh(distances), np.inf)
         np.fill_diagonal(weights, 0.0)
-        return cls("points", environment, free, points, visible, weights, np.full(len(points), -1), sight)
+        return cls("points", environment, radius_m, free, points, visible, weights, np.full(len(points), -1), sight)
+
+    @property
+    def outlines(self) -> tuple[Floats, ...]:
+        """The cells of the map, those without a placement included, each (m, 2) float, metres; none for points."""
+        return self._sight.outlines
 
     @cached_property
     def geodesics(self) -> GeodesicMap:
@@ -217,6 +230,15 @@ class PlacementGraph:
             frontier = self.visible[frontier].any(axis=0) & (relays == NO_CHAIN)
         return relays
 
+    @property
+    def probes(self) -> Floats:
+        """Places to ask for all where an agent can be: (m, 2) float, metres.
+
+        Cells: the centroid of each, which is as good as all its points. Points: the placements and the vertices of
+        ``free``, among which are the corners of rooms that are hardest to see into.
+        """
+        return self._sight.probes
+
 
 @dataclass(frozen=True, eq=False)
 class _CellSight:
@@ -237,12 +259,21 @@ class _CellSight:
         here, there = int(self.cells.locate(p[None])[0]), self.cells.locate(points)
         return np.where((there >= 0) & (here >= 0), self.all_weights[here, there], np.inf)
 
+    @property
+    def probes(self) -> Floats:
+        return self.cells.centroids
+
+    @property
+    def outlines(self) -> tuple[Floats, ...]:
+        return self.cells.polygons
+
 
 @dataclass(frozen=True, eq=False)
 class _PointSight:
     """Lines of sight through the map as drawn."""
 
     environment: Environment
+    free: Environment
     positions: Floats
     greatest_m: float
     """Length of the longest link between placements."""
@@ -257,3 +288,11 @@ class _PointSight:
     def direct(self, p: Floats, points: Floats) -> Floats:
         seen = np.asarray(self.environment.line_of_sight(p[None], points))
         return np.where(seen, self.weigh(np.hypot(*(points - p).T)), np.inf)
+
+    @property
+    def probes(self) -> Floats:
+        return np.concatenate([self.positions, self.free.vertices])
+
+    @property
+    def outlines(self) -> tuple[Floats, ...]:
+        return ()

@@ -115,7 +115,7 @@ class Placement(msgspec.Struct, frozen=True, kw_only=True):
     robot: Name
     position: Point
     cell: Count | None = None
-    """Cell of the decomposition; none for a robot that is not part of the chain."""
+    """Cell of the decomposition; none where placements are points, and for a robot that is not part of the chain."""
     spare: bool = False
     """A spare is no vertex of the deployment: it accompanies the agent until it is needed."""
 
@@ -133,6 +133,11 @@ class Deployment(Body, frozen=True, kw_only=True, tag="deployment"):
     """Links of the deployment tree between peers; from the base station, through relays, to the agent."""
     cost: float
     """Virtual cost of the chain (thesis eq. 25–26)."""
+    total_cost_m: float | None = None
+    """What the leader minimised, in metres: what the relays drive, and what the links are worth; none for no chain."""
+    lower_bound_m: float | None = None
+    """No chain that serves the same purpose costs less than this in all; equal to ``total_cost_m`` if that is proven to
+    be the least."""
     relays_needed: Count
     reason: Text
     """Why this decision replaced the one before."""

@@ -76,6 +76,8 @@ EXAMPLES: Final[tuple[AnyBody, ...]] = (
         ),
         edges=(("base", "robot1"), ("robot1", "agent")),
         cost=1.8,
+        total_cost_m=11.4,
+        lower_bound_m=11.4,
         relays_needed=1,
         reason="the agent was about to leave the sight of the base",
     ),

@@ -121,11 +121,10 @@ def _simulate(file: Path, seeds: int, duration_s: float | None, record: Path | N
 def _open_recorder(preparation: Preparation, file: Path) -> RerunRecorder:
     """A recorder for a whole team, with the map drawn."""
     from agents.recorder import RerunRecorder
-    from planning.decomposition import decompose
 
-    mission = preparation.mission
+    mission, graph = preparation.mission, preparation.planner.graph
     recorder = RerunRecorder(file, team=mission.team, recording_id=f"{mission.team}-{mission.seed}", peer="simulation")
-    recorder.log_map(preparation.environment, decompose(preparation.environment, mission.decomposition).polygons)
+    recorder.log_map(preparation.environment, graph.outlines, graph.positions)
     recorder.log_blueprint(mission)
     return recorder
 

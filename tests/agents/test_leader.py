@@ -117,7 +117,7 @@ def test_too_few_robots_man_the_chain_from_the_base_outward(planner: DeploymentP
 
 def test_an_agent_in_sight_of_the_base_needs_no_relay(planner: DeploymentPlanner, office: Environment) -> None:
     plan = planner.plan((4.5, 10.5), (), {}, None)
-    assert plan == Plan((), (("home", "visitor"),), plan.cost, 0, True, plan.reason)
+    assert plan == Plan((), (("home", "visitor"),), 0.0, 0, True, plan.reason, 0.0, 0.0)
     robots = _team(_places(office, 3, 1))
     plan = planner.plan((4.5, 10.5), (), robots, None)
     assert all(placement.spare for placement in plan.placements)

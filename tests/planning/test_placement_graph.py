@@ -16,12 +16,13 @@ from hypothesis import strategies as st
 import maps
 from planning import placement_points
 from planning.decomposition import decompose
+from planning.deployment import NO_CHAIN
 from planning.environment import Environment
 from planning.geodesic import GeodesicMap, NotInFreeSpace
 from planning.geodesic_table import GeodesicTable
 from planning.inflation import NothingLeft
 from planning.mutual_visibility import mutual_visibility
-from planning.placement_graph import NO_CHAIN, PlacementGraph
+from planning.placement_graph import PlacementGraph
 from planning.placement_points import UnfitSpacing
 from tests.planning.polygons import covered_segments, environment_of, free_points
 

@@ -1,0 +1,257 @@
+"""The chains that a leader considers: for where the agent is, and for where it will be some metres farther on its way.
+
+What a chain costs, in metres, and what every search minimises:
+
+    Σ over relays of (driven + 3 · driven while the agent is already there + 1.5)  +  3 · Σ over links of W
+
+W are the virtual weights of the placements' links (thesis eq. 25–26). The searches are those of
+:func:`planning.redeployment.redeploy`: ``"chain"`` and ``"exact"`` find the least cost over all choices and orders of
+robots, ``"one-edge"`` and ``"fixed"`` (thesis §3.5–3.6) stay within one edge of the team's tree, or keep it. That tree
+is the standing chain, and the spares hang on the agent, whom they follow: so one edge less and one more make the spare
+at the agent the last relay, or a relay a spare.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from planning.chain import cheapest_chain
+from planning.deployment import NO_CHAIN, identify_robots
+from planning.foresight import length, walk
+from planning.placement_graph import PlacementGraph
+from protocol.messages import Placement, Point
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+Search: TypeAlias = Literal["chain", "exact", "one-edge", "fixed"]
+
+PREVIEWS_M: Final = (0.0, 1.5, 4.0, 8.0, 16.0)
+"""How far ahead on the agent's path the proposed chains reach."""
+
+METRES_PER_WEIGHT: Final = 3.0
+"""A virtual weight of 1 is worth so many metres of driving."""
+
+RELAY_M: Final = 1.5
+"""So many metres are driven rather than one relay more is used, besides what its link costs."""
+
+LATENESS: Final = 3.0
+"""A metre that a robot drives while the agent is already where it needs it counts so many times more."""
+
+PIECE_M: Final = 0.5
+"""Whether a relay sees the agent's way is asked so often."""
+
+BASE, AGENT, FIRST_ROBOT = 0, 1, 2
+"""Nodes of the team's tree."""
+
+
+@dataclass(frozen=True, slots=True)
+class Proposal:
+    """Relays from the base outward, and what becomes of it."""
+
+    relays: tuple[Placement, ...]
+    complete: bool
+    """Whether the chain reaches the agent."""
+    reason: str
+    cost: float = 0.0
+    """Sum of the links' virtual weights (thesis eq. 25–26); 0 without a chain."""
+    total_cost_m: float | None = None
+    """What the search minimised (see the module)."""
+    lower_bound_m: float | None = None
+    """No chain for the same preview can cost less."""
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What a search found: rows of robots from the base outward, their placements, and the cost and its bound."""
+
+    robots: tuple[int, ...]
+    places: tuple[int, ...]
+    cost_m: float
+    lower_bound_m: float
+
+
+class Proposer:
+    """Proposes chains between a base station that stays and an agent.
+
+    Args:
+        graph: where relays can stand.
+        base: where the base station stands, metres, map frame.
+        search: see the module.
+        robot_speed_m_s: of the robots.
+        agent_speed_m_s: of the agent.
+    """
+
+    def __init__(
+        self, graph: PlacementGraph, base: Point, search: Search, *, robot_speed_m_s: float, agent_speed_m_s: float
+    ) -> None:
+        self._graph, self._base, self._search = graph, base, search
+        self._speed_ratio = robot_speed_m_s / agent_speed_m_s
+        self._from_base = METRES_PER_WEIGHT * graph.link_weights(base)
+        self._links = METRES_PER_WEIGHT * graph.weights
+        self._relays = graph.relays_from(base)
+
+    def chains(self, way: Floats, robots: Mapping[str, Point], standing: Sequence[str]) -> list[Proposal]:
+        """One for each preview that the robots suffice for.
+
+        Args:
+            way: (m, 2) float, metres: the agent's, from where it is.
+            robots: where they are, in free space.
+            standing: relays of the chain that there is, from the base outward.
+        """
+        order = _order(way[0], robots, standing)
+        tree = _tree(order, standing)
+        drive = np.array([self._graph.distances_from(robots[name]) for name in order]).reshape(
+            len(order), len(self._graph)
+        )
+        previews = sorted({min(preview, length(way)) for preview in PREVIEWS_M})
+        found = [self._chain(way, preview, order, drive, self._search, tree) for preview in previews]
+        if self._search in ("one-edge", "fixed") and not any(found):
+            # The team's tree is too far from one that serves.
+            found = [self._chain(way, preview, order, drive, "chain", tree) for preview in previews]
+        return [proposal for proposal in found if proposal is not None]
+
+    def _chain(
+        self, way: Floats, preview: float, order: list[str], drive: Floats, search: Search, tree: Ints
+    ) -> Proposal | None:
+        """The cheapest chain for an agent that goes so far on its way; None if the robots make none."""
+        pieces = walk(way, np.linspace(0.0, preview, 1 + math.ceil(preview / PIECE_M)))
+        weights = self._graph.link_weights(pieces)
+        direct = self._graph.direct_weights(self._base, pieces)
+        known = np.isfinite(weights).any(axis=1) | np.isfinite(direct)
+        weights, direct = weights[known], direct[known]
+        where = f"for the agent at {name_place(way[0])}" + (f" and {preview:.1f} m on" if preview > 0.0 else "")
+        if not known.any():
+            return None
+        if np.isfinite(direct).all():
+            cost = METRES_PER_WEIGHT * float(direct[-1])
+            return Proposal((), True, f"no relay needed {where}", float(direct[-1]), cost, cost)
+        # The robots have until the agent is there.
+        move = drive + LATENESS * np.maximum(0.0, drive - preview * self._speed_ratio)
+        for covered in (weights, weights[-1:]):
+            sees = np.isfinite(covered).all(axis=0)
+            to_agent = np.where(sees, METRES_PER_WEIGHT * weights[-1], np.inf)
+            found = self._find(move, to_agent, search, tree)
+            if found is not None:
+                relays = tuple(
+                    self._placement(order[robot], place)
+                    for robot, place in zip(found.robots, found.places, strict=True)
+                )
+                links = [self._from_base[found.places[0]], *(self._links[hop] for hop in pairwise(found.places))]
+                cost = float(sum(links) + to_agent[found.places[-1]]) / METRES_PER_WEIGHT
+                reason = f"{relays_in_words(len(relays))} {where}"
+                return Proposal(relays, True, reason, cost, found.cost_m, found.lower_bound_m)
+        return None
+
+    def _find(self, move: Floats, to_agent: Floats, search: Search, tree: Ints) -> Found | None:
+        """The chain of one search."""
+        if search == "chain":
+            chain = cheapest_chain(self._links, move, self._from_base, to_agent, RELAY_M)
+            return None if chain is None else Found(chain.robots, chain.cells, chain.cost, chain.lower_bound)
+        # Base and agent become two nodes of the tree, in two places of their own.
+        places = len(self._links)
+        base, agent = places, places + 1
+        W = np.full((places + 2, places + 2), np.inf)
+        W[:places, :places] = self._links
+        W[base, :places] = W[:places, base] = self._from_base
+        W[agent, :places] = W[:places, agent] = to_agent
+        np.fill_diagonal(W, 0.0)
+        costs = np.full((FIRST_ROBOT + len(move), places + 2), np.inf)
+        costs[BASE, base] = costs[AGENT, agent] = 0.0
+        costs[FIRST_ROBOT:, :places] = move + RELAY_M
+        from planning.redeployment import redeploy
+
+        found = redeploy(costs, W, search=search, tree=tree, ends=(BASE, AGENT), idle=True)
+        if found.tree is None:
+            return None
+        between = _between(found.tree)
+        stops = [int(found.cells[node]) for node in between]
+        # Where two would stand in one place, one will do.
+        kept = [index for index, stop in enumerate(stops) if index == 0 or stop != stops[index - 1]]
+        return Found(
+            tuple(between[index] - FIRST_ROBOT for index in kept),
+            tuple(stops[index] for index in kept),
+            float(found.cost),
+            float(found.lower_bound),
+        )
+
+    def relays_needed(self, points: ArrayLike) -> Ints:
+        """Fewest relays of a chain to an agent at each of these points (m, 2), metres: (m,) int, NO_CHAIN for none."""
+        places = np.reshape(points, (-1, 2))
+        last = np.where(self._graph.sees(places) & (self._relays != NO_CHAIN), self._relays, len(self._relays) + 1)
+        needed: Ints = last.min(axis=1)
+        needed[needed > len(self._relays)] = NO_CHAIN
+        needed[np.isfinite(self._graph.direct_weights(self._base, places))] = 0
+        return needed
+
+    def outward(self, agent: Point, robots: Mapping[str, Point]) -> Proposal:
+        """Too few robots for a chain: those that there are man one of fewest relays from the base outward.
+
+        The agent's place must be one that a chain reaches.
+        """
+        weights = self._graph.link_weights(agent)
+        needed = int(self.relays_needed(agent)[0])
+        # Back to the base, where there is a choice by the cheapest link.
+        places = [int(np.argmin(np.where(self._relays == needed, weights, np.inf)))]
+        for relays in range(needed - 1, 0, -1):
+            places.insert(0, int(np.argmin(np.where(self._relays == relays, self._graph.weights[places[0]], np.inf))))
+        places = places[: len(robots)]
+        names = list(robots)
+        costs = np.array([self._graph.distances_from(place)[places] for place in robots.values()])
+        chosen = identify_robots(costs.reshape(len(names), len(places)))
+        manned = tuple(self._placement(names[robot], place) for robot, place in zip(chosen, places, strict=True))
+        missing = needed - len(manned)
+        reason = f"{relays_in_words(needed)} needed and {missing} missing: the chain ends before the agent"
+        return Proposal(manned, False, reason)
+
+    def _placement(self, robot: str, place: int) -> Placement:
+        x, y = self._graph.positions[place].tolist()
+        cell = int(self._graph.cells[place])
+        return Placement(robot=robot, position=(x, y), cell=cell if cell >= 0 else None)
+
+
+def _order(agent: Floats, robots: Mapping[str, Point], standing: Sequence[str]) -> list[str]:
+    """The relays of the standing chain from the base outward, then the others, nearest to the agent last."""
+    others = [name for name in robots if name not in standing]
+    return [*standing, *sorted(others, key=lambda name: -math.dist(robots[name], agent))]
+
+
+def _tree(order: Sequence[str], standing: Sequence[str]) -> Ints:
+    """The team's tree: base, standing chain, agent, and the others at the agent; robots by their place in ``order``."""
+    chain = [BASE, *range(FIRST_ROBOT, FIRST_ROBOT + len(standing)), AGENT]
+    spares = range(FIRST_ROBOT + len(standing), FIRST_ROBOT + len(order))
+    return np.array([*pairwise(chain), *((AGENT, spare) for spare in spares)], dtype=np.int64)
+
+
+def _between(tree: Ints) -> list[int]:
+    """Nodes on the tree's path from the base to the agent, without these."""
+    before = {BASE: BASE}
+    reached = [BASE]
+    for node in reached:
+        for edge in tree.tolist():
+            if node in edge:
+                other = edge[0] + edge[1] - node
+                if other not in before:
+                    before[other] = node
+                    reached.append(other)
+    path = [AGENT]
+    while path[-1] != BASE:
+        path.append(before[path[-1]])
+    return path[-2:0:-1]
+
+
+def name_place(point: Point | Floats) -> str:
+    """A place in words."""
+    return f"({point[0]:.4g}, {point[1]:.4g}) m"
+
+
+def relays_in_words(number: int) -> str:
+    """So many relays."""
+    return f"{number} relay{'' if number == 1 else 's'}"
