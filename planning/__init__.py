@@ -18,14 +18,18 @@ if TYPE_CHECKING:
     from planning.geodesic import GeodesicMap
     from planning.mutual_visibility import mutual_visibility
     from planning.placement_graph import PlacementGraph
+    from planning.steiner import steiner_tree
+    from planning.tree import Tree
 
 __all__ = [
     "Cells",
     "Environment",
     "GeodesicMap",
     "PlacementGraph",
+    "Tree",
     "decompose",
     "mutual_visibility",
+    "steiner_tree",
     "virtual_weights",
 ]
 
@@ -34,8 +38,10 @@ _HOMES = {
     "Environment": "planning.environment",
     "GeodesicMap": "planning.geodesic",
     "PlacementGraph": "planning.placement_graph",
+    "Tree": "planning.tree",
     "decompose": "planning.decomposition",
     "mutual_visibility": "planning.mutual_visibility",
+    "steiner_tree": "planning.steiner",
     "virtual_weights": "planning.edge_weights",
 }
 

@@ -22,8 +22,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from planning.distance_network import distance_network
+from planning.dreyfus_wagner import exact_tree
 from planning.kernel import kernel
-from planning.tree import Floats, Ints, InvalidTerminals, NoTree, Tree, checked_terminals, checked_weights
+from planning.tree import (
+    Bools,
+    Floats,
+    Ints,
+    InvalidRequest,
+    NoTree,
+    Tree,
+    checked_terminals,
+    checked_weights,
+    without_repetition,
+)
 
 LARGEST_TABLE = 2**27
 """Entries of a table (1 GiB). There are two, and beyond it a question would take hours to answer."""
@@ -87,7 +99,7 @@ def fixed_size_programme(
             where they are for nothing. None: 0 everywhere.
 
     Raises:
-        InvalidWeights, InvalidTerminals: W, terminals, vertices or node_cost are not that, or the tables would be
+        InvalidWeights, InvalidRequest: W, terminals, vertices or node_cost are not that, or the tables would be
             larger than :data:`LARGEST_TABLE`.
 
     Complexity: O(3^t r² N + 2^t r N²) time and O(2^t r N) memory for r = vertices − t robots.
@@ -98,13 +110,13 @@ def fixed_size_programme(
     joined = checked_terminals(terminals, number)
     robots = vertices - len(joined)
     if robots < 0:
-        raise InvalidTerminals(f"a tree of {vertices} nodes cannot hold {len(joined)} terminals: ask for more nodes")
+        raise InvalidRequest(f"a tree of {vertices} nodes cannot hold {len(joined)} terminals: ask for more nodes")
     standing = np.zeros(number) if node_cost is None else np.array(node_cost, dtype=np.float64)
     if standing.shape != (number,) or np.isnan(standing).any():
-        raise InvalidTerminals(f"node costs are {number} numbers, one for each placement")
+        raise InvalidRequest(f"node costs are {number} numbers, one for each placement")
     shape = (2 ** (len(joined) - 1), robots + 1, number)
     if np.prod(np.array(shape, dtype=np.float64)) > LARGEST_TABLE:
-        raise InvalidTerminals(
+        raise InvalidRequest(
             f"{len(joined)} terminals, {robots} robots and {number} placements are too many for an exact tree of fixed "
             "size: take fewer"
         )
@@ -119,6 +131,47 @@ def fixed_size_programme(
     _gather(gathered, np.ascontiguousarray(hooked[:, :, joined[:1]]))
     costs = gathered[-1, :, 0].copy()
     return FixedSizeProgramme(costs, weights, joined, rooted, hooked, gathered[:, :, 0])
+
+
+def fixed_size_tree(W: Floats, terminals: Ints, vertices: int, standing: Bools) -> Tree:
+    """A cheapest tree of exactly this number of nodes.
+
+    A tree of free size that needs no more is one, for the robots that are left stand where another node is. So the
+    programme is run for those numbers only that are a restriction.
+
+    Args:
+        W: (N, N) float, checked.
+        terminals: (t,) int, checked; those that coincide are a node each.
+        vertices: number of nodes, terminals included.
+        standing: (N,) bool: where robots can stand.
+
+    Raises:
+        InvalidRequest: more terminals than vertices, or too many for an exact tree.
+        NoTree: a terminal cannot be reached, or only with more vertices.
+    """
+    if vertices < len(terminals):
+        raise InvalidRequest(
+            f"a tree of {vertices} nodes cannot hold {len(terminals)} terminals: ask for more vertices"
+        )
+    distinct = without_repetition(terminals)
+    coinciding = list(terminals)
+    for v in distinct:
+        coinciding.remove(v)
+    free = exact_tree(W, distance_network(W, distinct))
+    places = free.nodes[standing[free.nodes]]
+    spare = vertices - len(free.nodes) - len(coinciding)
+    if spare == 0 or (spare > 0 and len(places)):
+        doubled = np.array([*coinciding, *places[:1].repeat(spare)], dtype=np.int64)
+        nodes = np.concatenate((terminals, free.nodes[len(distinct) :], doubled[len(coinciding) :]))
+        return Tree(free.cost, np.concatenate((free.edges, np.column_stack((doubled, doubled)))), nodes)
+    programme = fixed_size_programme(W, terminals, vertices, np.where(standing, 0.0, np.inf))
+    if np.isfinite(programme.costs[-1]):
+        return programme.tree(vertices - len(terminals))
+    links = np.where(np.isfinite(W), 1.0, np.inf)
+    fewest = len(exact_tree(links, distance_network(links, distinct)).nodes) + len(coinciding)
+    raise NoTree(
+        f"{vertices} nodes do not join the terminals in placements {terminals.tolist()}: it takes {fewest} at least"
+    )
 
 
 def _branches(rooted: Floats, hooked: Floats, X: int, m: int, *, own: int) -> tuple[list[tuple[int, int]], bool]:

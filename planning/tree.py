@@ -7,6 +7,7 @@ join: those of the tracked agents and of the base station (thesis §3.3.3).
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,8 +17,9 @@ from planning.kernel import kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
-TILE = 32
+TILE = 16
 """Rows and columns compared at once with their mirror image, so that both stay in the cache."""
 
 
@@ -25,7 +27,7 @@ class InvalidWeights(ValueError):
     """The weights are no symmetric matrix of numbers that are not negative; the text says where."""
 
 
-class InvalidTerminals(ValueError):
+class InvalidRequest(ValueError):
     """The terminals, or what else is asked of a tree, make no sense for this graph; the text says which."""
 
 
@@ -61,18 +63,19 @@ def checked_weights(W: ArrayLike) -> Floats:
     Complexity: O(N²).
     """
     try:
-        weights = np.ascontiguousarray(W, dtype=np.float64)
+        # Writable too, for kernels are compiled anew for arrays that are not.
+        weights = np.require(W, np.float64, ["C_CONTIGUOUS", "WRITEABLE"])
     except (TypeError, ValueError):
         raise InvalidWeights(f"edge weights form a matrix of numbers; this is {type(W).__name__}") from None
     if weights.ndim != 2 or weights.shape[0] != weights.shape[1]:
         raise InvalidWeights(f"edge weights form a square matrix, not one of shape {weights.shape}")
-    row, column = _fault(weights)
-    if row < 0:
+    if not _faults(weights):
         return weights
+    row, column = np.argwhere(~((weights >= 0) & (weights == weights.T)))[0]
     weight, mirrored = weights[row, column], weights[column, row]
-    if weight == mirrored:
+    if weight < 0:
         raise InvalidWeights(f"edge weights are not negative, but W[{row}, {column}] is {weight}")
-    if np.isnan(weight) or np.isnan(mirrored):
+    if np.isnan(weight):
         raise InvalidWeights(f"edge weights are numbers, but W[{row}, {column}] is {weight}: say inf for no link")
     raise InvalidWeights(
         f"edge weights are symmetric, but W[{row}, {column}] is {weight} and W[{column}, {row}] is {mirrored}: "
@@ -88,32 +91,69 @@ def checked_terminals(terminals: ArrayLike, number: int) -> Ints:
         number: how many placements there are.
 
     Raises:
-        InvalidTerminals: there is none, or one is no placement.
+        InvalidRequest: there is none, or one is no placement.
     """
     try:
         given = np.asarray(terminals)
     except ValueError:
         given = np.empty((0, 0))
     if given.ndim == 1 and len(given) == 0:
-        raise InvalidTerminals("a tree joins at least one terminal; none was given")
+        raise InvalidRequest("a tree joins at least one terminal; none was given")
     if given.ndim != 1 or given.dtype.kind not in "iu":
-        raise InvalidTerminals(f"terminals are a list of placements, which are whole numbers; this is {terminals!r}")
+        raise InvalidRequest(f"terminals are a list of placements, which are whole numbers; this is {terminals!r}")
     outside = np.flatnonzero((given < 0) | (given >= number))
     if len(outside):
-        raise InvalidTerminals(
+        raise InvalidRequest(
             f"terminal {outside[0]} is placement {given[outside[0]]}, but the placements are 0 to {number - 1}"
         )
     return given.astype(np.int64)
 
 
+def without_repetition(terminals: Ints) -> Ints:
+    """The different ones, in the order of their first occurrence."""
+    return np.array(list(dict.fromkeys(terminals.tolist())), dtype=np.int64)
+
+
+def joining_tree(W: Floats, edges: Iterable[tuple[int, int]], terminals: Ints) -> Tree:
+    """The cheapest spanning tree of some edges, without leaves that are no terminals (thesis §3.3.3, alg. 2, 4–5).
+
+    Args:
+        W: (N, N) float, symmetric.
+        edges: pairs of placements that join the terminals; they may repeat and form cycles.
+        terminals: (t,) int, all different.
+
+    Complexity: O(m log m) for m edges (Kruskal), and as much again for each layer of leaves.
+    """
+    component = {int(terminal): {int(terminal)} for terminal in terminals}
+    kept = []
+    for u, v in sorted({(min(edge), max(edge)) for edge in edges}, key=lambda edge: float(W[edge])):
+        one, other = component.setdefault(u, {u}), component.setdefault(v, {v})
+        if one is not other:
+            kept.append((u, v))
+            one |= other
+            component.update(dict.fromkeys(other, one))
+    while True:
+        joined = np.array(kept, dtype=np.int64).reshape(-1, 2)
+        degrees = np.bincount(joined.ravel(), minlength=len(W))
+        degrees[terminals] = 2  # They stay, as if they were no leaves.
+        kept = [(u, v) for u, v in kept if degrees[u] > 1 and degrees[v] > 1]
+        if len(kept) == len(joined):
+            break
+    steiner = np.setdiff1d(joined, terminals)
+    return Tree(float(W[joined[:, 0], joined[:, 1]].sum()), joined, np.concatenate((terminals, steiner)))
+
+
 @kernel
-def _fault(W: Floats) -> tuple[int, int]:
-    """The place of a weight that is negative, no number, or not its mirror image; (-1, -1): there is none."""
+def _faults(W: Floats) -> int:
+    """How many weights of the upper half are negative, no number, or not their mirror image, those near it included.
+
+    Counts without a branch, tile by tile.
+    """
     number = len(W)
+    faults = 0
     for top in range(0, number, TILE):
         for left in range(top, number, TILE):
             for row in range(top, min(top + TILE, number)):
-                for column in range(max(left, row + 1), min(left + TILE, number)):
-                    if not (W[row, column] >= 0.0 and W[row, column] == W[column, row]):
-                        return row, column
-    return -1, -1
+                for column in range(left, min(left + TILE, number)):
+                    faults += (not W[row, column] >= 0.0) | (W[row, column] != W[column, row])
+    return faults

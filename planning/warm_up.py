@@ -12,6 +12,7 @@ def exercise() -> None:
     from planning.decomposition import decompose
     from planning.edge_weights import virtual_weights
     from planning.environment import Environment
+    from planning.fixed_size_steiner import fixed_size_programme
     from planning.foresight import chain_holds
     from planning.geodesic import GeodesicMap
     from planning.grid_outline import outline
@@ -20,6 +21,7 @@ def exercise() -> None:
     from planning.placement import reachable_positions
     from planning.placement_graph import PlacementGraph
     from planning.shortest_paths import all_pairs, from_source
+    from planning.steiner import steiner_tree
 
     outline(np.ones((4, 4), dtype=np.bool_), np.ones((4, 4)), 1.0)
     rooms = Environment(
@@ -46,6 +48,8 @@ def exercise() -> None:
         weights = virtual_weights(cells, mutual_visibility(cells))
         all_pairs(weights)
         from_source(weights, 0)
+        steiner_tree(weights, [0, 1, 2, 3])
+        fixed_size_programme(weights, [0, 1], 3)
         cheapest_chain(weights, np.ones((2, len(weights))), weights[0], weights[-1], 1.0)
         search_in_order(weights, np.ones((2, len(weights))), weights[0], weights[-1])
         reachable_positions(cells, free)
