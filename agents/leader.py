@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.outlook import Outlook
-from agents.proposals import PREVIEWS_M, Proposal, Proposer, Search, name_place, relays_in_words
+from agents.proposals import PREVIEWS_M, Proposal, Proposer, name_place, relays_in_words
 from agents.spares import Waiting
 from planning.decomposition import Kind, decompose
 from planning.deployment import NO_CHAIN, NoChain
@@ -32,6 +32,7 @@ from planning.environment import Environment
 from planning.foresight import walk
 from planning.mutual_visibility import mutual_visibility
 from planning.placement_graph import PlacementGraph
+from planning.redeployment import Search
 from protocol.messages import Placement, Point
 
 Floats = NDArray[np.float64]

@@ -17,7 +17,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Final, Literal, TypeAlias
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,12 +26,11 @@ from planning.chain import cheapest_chain
 from planning.deployment import NO_CHAIN, identify_robots
 from planning.foresight import length, walk
 from planning.placement_graph import PlacementGraph
+from planning.redeployment import Search, redeploy
 from protocol.messages import Placement, Point
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-Search: TypeAlias = Literal["chain", "exact", "one-edge", "fixed"]
 
 PREVIEWS_M: Final = (0.0, 1.5, 4.0, 8.0, 16.0)
 """How far ahead on the agent's path the proposed chains reach."""
@@ -166,8 +165,6 @@ class Proposer:
         costs = np.full((FIRST_ROBOT + len(move), places + 2), np.inf)
         costs[BASE, base] = costs[AGENT, agent] = 0.0
         costs[FIRST_ROBOT:, :places] = move + RELAY_M
-        from planning.redeployment import redeploy
-
         found = redeploy(costs, W, search=search, tree=tree, ends=(BASE, AGENT), idle=True)
         if found.tree is None:
             return None
