@@ -12,35 +12,65 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from planning.adjacency_path import AdjacencyPaths
     from planning.decomposition import Cells, decompose
+    from planning.deployment import Deployment
+    from planning.deployment_sequence import DeploymentSequence, identify_sequence, physical_cost
     from planning.edge_weights import virtual_weights
     from planning.environment import Environment
     from planning.geodesic import GeodesicMap
     from planning.mutual_visibility import mutual_visibility
+    from planning.physical_weights import (
+        adjacency_path_weights,
+        arrival_times,
+        bounded_weights,
+        euclidean_weights,
+        geodesic_weights,
+    )
     from planning.placement_graph import PlacementGraph
     from planning.steiner import steiner_tree
     from planning.tree import Tree
 
 __all__ = [
+    "AdjacencyPaths",
     "Cells",
+    "Deployment",
+    "DeploymentSequence",
     "Environment",
     "GeodesicMap",
     "PlacementGraph",
     "Tree",
+    "adjacency_path_weights",
+    "arrival_times",
+    "bounded_weights",
     "decompose",
+    "euclidean_weights",
+    "geodesic_weights",
+    "identify_sequence",
     "mutual_visibility",
+    "physical_cost",
     "steiner_tree",
     "virtual_weights",
 ]
 
 _HOMES = {
+    "AdjacencyPaths": "planning.adjacency_path",
     "Cells": "planning.decomposition",
+    "Deployment": "planning.deployment",
+    "DeploymentSequence": "planning.deployment_sequence",
     "Environment": "planning.environment",
     "GeodesicMap": "planning.geodesic",
     "PlacementGraph": "planning.placement_graph",
     "Tree": "planning.tree",
+    "adjacency_path_weights": "planning.physical_weights",
+    "arrival_times": "planning.physical_weights",
+    "bounded_weights": "planning.physical_weights",
     "decompose": "planning.decomposition",
+    "euclidean_weights": "planning.physical_weights",
+    "geodesic_weights": "planning.physical_weights",
+    "identify_sequence": "planning.deployment_sequence",
     "mutual_visibility": "planning.mutual_visibility",
+    "physical_cost": "planning.deployment_sequence",
     "steiner_tree": "planning.steiner",
     "virtual_weights": "planning.edge_weights",
 }
