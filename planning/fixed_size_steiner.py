@@ -111,8 +111,8 @@ def fixed_size_programme(
     robots = vertices - len(joined)
     if robots < 0:
         raise InvalidRequest(f"a tree of {vertices} nodes cannot hold {len(joined)} terminals: ask for more nodes")
-    standing = np.zeros(number) if node_cost is None else np.array(node_cost, dtype=np.float64)
-    if standing.shape != (number,) or np.isnan(standing).any():
+    standing = np.zeros(number) if node_cost is None else np.asarray(node_cost)
+    if standing.shape != (number,) or standing.dtype.kind not in "iuf" or np.isnan(standing).any():
         raise InvalidRequest(f"node costs are {number} numbers, one for each placement")
     shape = (2 ** (len(joined) - 1), robots + 1, number)
     if np.prod(np.array(shape, dtype=np.float64)) > LARGEST_TABLE:

@@ -139,8 +139,9 @@ def joining_tree(W: Floats, edges: Iterable[tuple[int, int]], terminals: Ints) -
         kept = [(u, v) for u, v in kept if degrees[u] > 1 and degrees[v] > 1]
         if len(kept) == len(joined):
             break
-    steiner = np.setdiff1d(joined, terminals)
-    return Tree(float(W[joined[:, 0], joined[:, 1]].sum()), joined, np.concatenate((terminals, steiner)))
+    others = sorted({v for edge in kept for v in edge}.difference(terminals.tolist()))
+    nodes = np.concatenate((terminals, np.array(others, dtype=np.int64)))
+    return Tree(float(W[joined[:, 0], joined[:, 1]].sum()), joined, nodes)
 
 
 @kernel
