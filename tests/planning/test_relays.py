@@ -67,7 +67,7 @@ def test_any_two_places_need_at_most_two_relays_more_than_two_placements(name: s
     for p, q in zip(places[::2], places[1::2], strict=True):
         ends = np.stack([p, q])
         direct = np.isfinite(np.array([graph.direct_weights(end, ends) for end in ends]))
-        assert len(fewest_relays(graph.visible, graph.sees(ends), direct).relays) <= most + 2
+        assert len(fewest_relays(graph.visible, np.array([graph.sees(end) for end in ends]), direct).relays) <= most + 2
 
 
 def count_by_enumeration(visible: Bools, seen: Bools, direct: Bools) -> int | None:
@@ -108,7 +108,7 @@ def test_two_terminals_are_a_chain() -> None:
     graph = points_of("room3")
     base, agent = (10.0, 36.0), (70.0, 10.0)
     ends = np.array([base, agent])
-    chain = fewest_relays(graph.visible, graph.sees(ends), np.eye(2, dtype=np.bool_))
+    chain = fewest_relays(graph.visible, np.array([graph.sees(end) for end in ends]), np.eye(2, dtype=np.bool_))
     hops = graph.relays_from(base)[graph.sees(agent)]
     assert len(chain.relays) == hops[hops != NO_CHAIN].min()
     assert len(chain.links) == len(chain.relays) + 1
