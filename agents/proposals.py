@@ -122,21 +122,16 @@ class Proposer:
     ) -> Proposal | None:
         """The cheapest chain for an agent that goes so far on its way; None if the robots make none."""
         pieces = walk(way, np.linspace(0.0, preview, 1 + math.ceil(preview / PIECE_M)))
-        weights = self._graph.link_weights(pieces)
         direct = self._graph.direct_weights(self._base, pieces)
-        known = np.isfinite(weights).any(axis=1) | np.isfinite(direct)
-        weights, direct = weights[known], direct[known]
+        weights = self._graph.link_weights(pieces[-1])
         where = f"for the agent at {name_place(way[0])}" + (f" and {preview:.1f} m on" if preview > 0.0 else "")
-        if not known.any():
-            return None
         if np.isfinite(direct).all():
             cost = METRES_PER_WEIGHT * float(direct[-1])
             return Proposal((), True, f"no relay needed {where}", float(direct[-1]), cost, cost)
         # The robots have until the agent is there.
         move = drive + LATENESS * np.maximum(0.0, drive - preview * self._speed_ratio)
-        for covered in (weights, weights[-1:]):
-            sees = np.isfinite(covered).all(axis=0)
-            to_agent = np.where(sees, METRES_PER_WEIGHT * weights[-1], np.inf)
+        for sees in (self._graph.sees_all(pieces), np.isfinite(weights)):
+            to_agent = np.where(sees, METRES_PER_WEIGHT * weights, np.inf)
             found = self._find(move, to_agent, search, tree)
             if found is not None:
                 relays = tuple(
@@ -182,9 +177,10 @@ class Proposer:
     def relays_needed(self, points: ArrayLike) -> Ints:
         """Fewest relays of a chain to an agent at each of these points (m, 2), metres: (m,) int, NO_CHAIN for none."""
         places = np.reshape(points, (-1, 2))
-        last = np.where(self._graph.sees(places) & (self._relays != NO_CHAIN), self._relays, len(self._relays) + 1)
-        needed: Ints = last.min(axis=1)
-        needed[needed > len(self._relays)] = NO_CHAIN
+        needed = np.full(len(places), NO_CHAIN)
+        for index, place in enumerate(places):
+            last = self._relays[self._graph.sees(place)]
+            needed[index] = min(last[last != NO_CHAIN], default=NO_CHAIN)
         needed[np.isfinite(self._graph.direct_weights(self._base, places))] = 0
         return needed
 

@@ -20,18 +20,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from planning.deployment import NO_CHAIN
-from planning.edge_weights import NORMALISED_PENALTY, virtual_weights
+from planning.edge_weights import virtual_weights
 from planning.environment import Environment
 from planning.geodesic import GeodesicMap
 from planning.geodesic_table import GeodesicTable
 from planning.placement import reachable_positions
 from planning.placement_points import choose_points, choose_spacing
+from planning.placement_sight import CellSight, PointSight, Sight
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -45,24 +46,6 @@ Bools = NDArray[np.bool_]
 
 class NoPlacement(ValueError):
     """A robot of this radius can stand in none of the cells."""
-
-
-class Sight(Protocol):
-    """How a kind of placements judges lines of sight from any point."""
-
-    def weights(self, points: Floats) -> Floats:
-        """Weights of the links between points (m, 2) and placements: (m, N), inf where there is none."""
-
-    def direct(self, p: Floats, points: Floats) -> Floats:
-        """Weights of the links between p (2,) and points (m, 2): (m,), inf where there is none."""
-
-    @property
-    def probes(self) -> Floats:
-        """Places that stand for all others: (m, 2)."""
-
-    @property
-    def outlines(self) -> tuple[Floats, ...]:
-        """Polygons that tile the map."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -131,7 +114,7 @@ class PlacementGraph:
         among = np.ascontiguousarray(weights[np.ix_(kept, kept)])
         return cls(
             "cells", environment, radius_m, free, positions[kept], np.isfinite(among), among, kept,
-            _CellSight(cells, weights, kept),
+            CellSight(cells, weights, kept),
         )  # fmt: skip
 
     @classmethod
@@ -164,7 +147,7 @@ class PlacementGraph:
         )
         distances = np.hypot(*(points[:, None] - points).transpose(2, 0, 1))
         # A single placement has no link to measure by.
-        sight = _PointSight(environment, free, points, float(distances[visible].max()) or 1.0)
+        sight = PointSight(environment, free, points, float(distances[visible].max()) or 1.0)
         weights = np.where(visible, sight.weigh(distances), np.inf)
         np.fill_diagonal(weights, 0.0)
         return cls("points", environment, radius_m, free, points, visible, weights, np.full(len(points), -1), sight)
@@ -196,19 +179,21 @@ class PlacementGraph:
         """
         return self._table.lengths(point)
 
-    def link_weights(self, points: ArrayLike) -> Floats:
-        """Weights of the links between points (m, 2) or one (2,), metres, and placements: (m, N) or (N,) float.
+    def link_weights(self, point: ArrayLike) -> Floats:
+        """Weights of the links between a point (2,), metres, and each placement: (N,) float, inf where there is none.
 
-        inf where a placement does not see the point. For cells that is a question of the point's cell, which all of the
-        placement's cell must see; a point in the placement's own cell is joined for 0. Points: O(m N w).
+        For cells that is a question of the point's cell, which all of the placement's cell must see; a point in the
+        placement's own cell is joined for 0. O(1) for cells, O(N w) for points.
         """
-        places = np.array(points, dtype=np.float64, order="C")
-        weights = self._sight.weights(places.reshape(-1, 2))
-        return weights[0] if places.ndim == 1 else weights
+        return self._sight.weights(np.array(point, dtype=np.float64).reshape(2))
 
-    def sees(self, points: ArrayLike) -> Bools:
-        """Which placements see points (m, 2) or one (2,), metres: (m, N) or (N,) bool. As :meth:`link_weights`."""
-        return np.isfinite(self.link_weights(points))
+    def sees(self, point: ArrayLike) -> Bools:
+        """Which placements see a point (2,), metres: (N,) bool. As :meth:`link_weights`."""
+        return np.isfinite(self.link_weights(point))
+
+    def sees_all(self, points: ArrayLike) -> Bools:
+        """Which placements see every one of ``points`` (m, 2), metres: (N,) bool. As :meth:`link_weights`."""
+        return self._sight.sees_all(np.array(points, dtype=np.float64, order="C").reshape(-1, 2))
 
     def direct_weights(self, p: ArrayLike, points: ArrayLike) -> Floats:
         """Weights of the links between p (2,) and points (m, 2), metres, without a relay: (m,) float, inf for none."""
@@ -238,61 +223,3 @@ class PlacementGraph:
         ``free``, among which are the corners of rooms that are hardest to see into.
         """
         return self._sight.probes
-
-
-@dataclass(frozen=True, eq=False)
-class _CellSight:
-    """Mutual visibility of the cells that points lie in."""
-
-    cells: Cells
-    all_weights: Floats
-    """Between all cells, those without a placement included: an agent may be there."""
-    kept: Ints
-
-    def weights(self, points: Floats) -> Floats:
-        located = self.cells.locate(points)
-        weights = np.ascontiguousarray(self.all_weights[np.ix_(located, self.kept)])
-        weights[located < 0] = np.inf
-        return weights
-
-    def direct(self, p: Floats, points: Floats) -> Floats:
-        here, there = int(self.cells.locate(p[None])[0]), self.cells.locate(points)
-        return np.where((there >= 0) & (here >= 0), self.all_weights[here, there], np.inf)
-
-    @property
-    def probes(self) -> Floats:
-        return self.cells.centroids
-
-    @property
-    def outlines(self) -> tuple[Floats, ...]:
-        return self.cells.polygons
-
-
-@dataclass(frozen=True, eq=False)
-class _PointSight:
-    """Lines of sight through the map as drawn."""
-
-    environment: Environment
-    free: Environment
-    positions: Floats
-    greatest_m: float
-    """Length of the longest link between placements."""
-
-    def weigh(self, distances: Floats) -> Floats:
-        """The weight of a link of such a length; farther than any placements from one another counts as far."""
-        return NORMALISED_PENALTY + 0.5 * np.minimum(distances / self.greatest_m, 1.0)
-
-    def weights(self, points: Floats) -> Floats:
-        return np.array([self.direct(point, self.positions) for point in points]).reshape(len(points), -1)
-
-    def direct(self, p: Floats, points: Floats) -> Floats:
-        seen = np.asarray(self.environment.line_of_sight(p[None], points))
-        return np.where(seen, self.weigh(np.hypot(*(points - p).T)), np.inf)
-
-    @property
-    def probes(self) -> Floats:
-        return np.concatenate([self.positions, self.free.vertices])
-
-    @property
-    def outlines(self) -> tuple[Floats, ...]:
-        return ()

@@ -20,6 +20,7 @@ def exercise() -> None:
     from planning.ordered_chain import search_in_order
     from planning.placement import reachable_positions
     from planning.placement_graph import PlacementGraph
+    from planning.redeployment import redeploy
     from planning.shortest_paths import all_pairs, from_source
     from planning.steiner import steiner_tree
 
@@ -42,6 +43,7 @@ def exercise() -> None:
     graph = PlacementGraph.from_points(rooms, 0.2, 2.0)
     graph.distances_from(points[0])
     _ = graph.distances
+    graph.sees(points[0])
     for kind in ("inflection", "aspect"):
         cells = decompose(rooms, kind)
         cells.locate(points)
@@ -51,5 +53,11 @@ def exercise() -> None:
         steiner_tree(weights, [0, 1, 2, 3])
         fixed_size_programme(weights, [0, 1], 3)
         cheapest_chain(weights, np.ones((2, len(weights))), weights[0], weights[-1], 1.0)
+        redeploy(
+            np.ones((5, len(weights))) * np.arange(5)[:, None],
+            weights,
+            search="one-edge",
+            tree=[(0, 1), (1, 2), (1, 3), (3, 4)],
+        )
         search_in_order(weights, np.ones((2, len(weights))), weights[0], weights[-1])
         reachable_positions(cells, free)

@@ -133,11 +133,13 @@ def test_a_table_of_geodesics_equals_one_search_for_each_pair(seed: int) -> None
 def test_any_point_is_joined_to_the_points_that_see_it() -> None:
     graph = _points("office")
     places = free_points(graph.environment, 20, np.random.default_rng(2))
-    sees = graph.sees(places)
+    sees = np.array([graph.sees(place) for place in places])
     for place, row in zip(places, sees, strict=True):
         pairs = np.stack([np.broadcast_to(place, graph.positions.shape), graph.positions], axis=1)
         np.testing.assert_array_equal(row, covered_segments(graph.environment, pairs))
-        np.testing.assert_array_equal(graph.sees(place), row)
+    for i in range(20):
+        together = [i, (i + 7) % 20]
+        np.testing.assert_array_equal(graph.sees_all(places[together]), sees[together].all(axis=0))
     longest_m = max(math.dist(graph.positions[i], graph.positions[j]) for i, j in np.argwhere(graph.visible))
     weights = graph.link_weights(places[0])
     for v in np.flatnonzero(sees[0]):
@@ -153,7 +155,10 @@ def test_any_point_is_joined_to_the_cells_that_all_of_its_cell_sees() -> None:
     seen = mutual_visibility(cells).toarray()
     places = free_points(graph.environment, 50, np.random.default_rng(3))
     located = cells.locate(places)
-    np.testing.assert_array_equal(graph.sees(places), seen[np.ix_(located, graph.cells)])
+    sees = np.array([graph.sees(place) for place in places])
+    np.testing.assert_array_equal(sees, seen[np.ix_(located, graph.cells)])
+    np.testing.assert_array_equal(graph.sees_all(places[:2]), sees[:2].all(axis=0))
+    assert not graph.sees_all([places[0], (-50.0, 0.0)]).any()
     np.testing.assert_array_equal(np.isfinite(graph.direct_weights(places[0], places)), seen[located[0]][located])
     assert not graph.sees((-50.0, 0.0)).any()
     assert np.isinf(graph.direct_weights((-50.0, 0.0), places)).all()
