@@ -28,6 +28,7 @@ if TYPE_CHECKING:
         geodesic_weights,
     )
     from planning.placement_graph import PlacementGraph
+    from planning.redeployment import Redeployment, redeploy
     from planning.steiner import steiner_tree
     from planning.tree import Tree
 
@@ -39,6 +40,7 @@ __all__ = [
     "Environment",
     "GeodesicMap",
     "PlacementGraph",
+    "Redeployment",
     "Tree",
     "adjacency_path_weights",
     "arrival_times",
@@ -61,6 +63,7 @@ _HOMES = {
     "Environment": "planning.environment",
     "GeodesicMap": "planning.geodesic",
     "PlacementGraph": "planning.placement_graph",
+    "Redeployment": "planning.redeployment",
     "Tree": "planning.tree",
     "adjacency_path_weights": "planning.physical_weights",
     "arrival_times": "planning.physical_weights",
@@ -71,6 +74,7 @@ _HOMES = {
     "identify_sequence": "planning.deployment_sequence",
     "mutual_visibility": "planning.mutual_visibility",
     "physical_cost": "planning.deployment_sequence",
+    "redeploy": "planning.redeployment",
     "steiner_tree": "planning.steiner",
     "virtual_weights": "planning.edge_weights",
 }

@@ -22,14 +22,8 @@ from planning.redeployment_bound import Counted, PriceAscent, count_nodes, name_
 from planning.subset_programme import ROOT, PlacedTree
 from planning.tree import Floats, Ints
 
-STATES: Final = 256
-"""Of the relaxed subset programme; more give a better bound, at a proportionate time a step."""
-
-STEPS: Final = 40
-"""Of the prices."""
-
-SEARCH_EVERY: Final = 8
-"""Steps between two searches from the tree of the relaxation."""
+STEPS: Final = 6
+"""Of the prices. More states in the relaxation are worth more than more steps: the first few gain most."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,7 +39,7 @@ class Found:
     """(k,) int: placements; -1 for nodes left out."""
 
 
-def search_with_bound(links: Links, move: Floats, ends: list[int], tree: Ints | None) -> Found:
+def search_with_bound(links: Links, move: Floats, ends: list[int], tree: Ints | None, most_states: int) -> Found:
     """A redeployment that is locally optimal, and what none can cost less than.
 
     Args:
@@ -53,25 +47,24 @@ def search_with_bound(links: Links, move: Floats, ends: list[int], tree: Ints | 
         move: (k, N) float, not negative: what it costs node i to go to placement v; inf where it cannot.
         ends: nodes that are needed, all nodes if none may idle.
         tree: (k − 1, 2) int: pairs of nodes to begin with as well; None: no such.
+        most_states: of the relaxed subset programme; more give a better bound and take as much longer.
 
-    Complexity: :data:`STEPS` relaxed programmes, O(STATES (k² N + N²)) each, and a few searches, O(k² N²) for each edge
+    Complexity: a few relaxed programmes, about O(most_states N²) each, and as many searches, O(k² N²) for each edge
         that they change.
     """
-    counted = count_nodes(move, ends, STATES)
+    counted = count_nodes(move, ends, most_states)
     ascent = PriceAscent(counted)
     best = Found(np.inf, 0.0, np.empty((0, 2), dtype=np.int64), np.full(len(move), -1, dtype=np.int64))
     if tree is not None:
         best = min(best, improve(links, move, ends, tree), key=lambda found: found.cost)
-    for step in range(STEPS):
+    for _ in range(STEPS):
         relaxation = relax(links, move, counted, ascent.prices)
         if np.isinf(relaxation.bound):
             return Found(np.inf, np.inf, best.edges, best.cells)
-        rising = ascent.step(relaxation, best.cost)
-        if step % SEARCH_EVERY == 0 or not rising or np.isinf(best.cost):
-            start = _named_tree(move, counted, relaxation.tree)
-            if start is not None:
-                best = min(best, improve(links, move, ends, start), key=lambda found: found.cost)
-        if not rising:
+        start = _named_tree(move, counted, relaxation.tree)
+        if start is not None:
+            best = min(best, improve(links, move, ends, start), key=lambda found: found.cost)
+        if not ascent.step(relaxation, best.cost):
             break
     return Found(best.cost, min(ascent.bound, best.cost), best.edges, best.cells)
 

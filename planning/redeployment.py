@@ -7,11 +7,11 @@ its weight:
 
 over the placements m and, as far as the search goes, over the tree. There are four searches:
 
-- ``fixed``: the given topology (thesis algorithms 4–6). Without costs of moving it is the deployment with known topology
-  of §3.3.4.
+- ``fixed``: the given topology (thesis algorithms 4–6). Without costs of moving it is the deployment with known
+  topology of §3.3.4.
 - ``one-edge``: the given topology and all that differ from it in one edge (algorithm 7).
-- ``exact``: all k^(k−2) topologies, which the thesis leaves open. Up to about a dozen nodes that differ it is the
-  optimum; beyond, a local optimum and a bound that says how far from the optimum it can be.
+- ``exact``: all k^(k−2) topologies, which the thesis leaves open. Up to 14 nodes it is the optimum; beyond, a local
+  optimum and a bound that says how far from the optimum it can be.
 - ``chain``: a chain between two ends, of the others as many as is cheapest.
 
 Robots that are not needed stay in the tree at the least cost, or may idle.
@@ -37,8 +37,11 @@ from planning.tree import Floats, Ints, checked_weights
 
 Search: TypeAlias = Literal["exact", "one-edge", "fixed", "chain"]
 
-EXACT_STATES: Final = 2**11
-"""States of the subset programme up to which a search is exact: 12 nodes, or more if some have the same costs."""
+EXACT_STATES: Final = 2**13
+"""States of the subset programme up to which a search is exact: 14 nodes, or more if some have the same costs."""
+
+RELAXED_STATES: Final = 2**11
+"""States of its relaxation where it is not."""
 
 BOUND_STATES: Final = 2**6
 """States that the lower bound of the other searches may take: 7 nodes exactly, more counted together."""
@@ -75,8 +78,9 @@ def redeploy(
     """The cheapest redeployment: thesis §3.5.1 and §3.6, and beyond them.
 
     Args:
-        move: (k, N) float, not negative: what it costs node i to go to placement v, in any unit; inf where it cannot go,
-            or not in time. Nodes are all members of the tree, base and agent included; a terminal has 0 in one place.
+        move: (k, N) float, not negative: what it costs node i to go to placement v, in any unit; inf where it cannot
+            go, or not in time. Nodes are all members of the tree, base and agent included; a terminal has 0 in one
+            place and inf elsewhere.
         W: (N, N) float, symmetric, not negative: weights of the direct links; inf where there is none. The diagonal is
             taken as 0: two nodes may share a placement.
         mu: μ, not negative: what a unit of W costs in the unit of ``move``.
@@ -84,7 +88,7 @@ def redeploy(
         tree: (k − 1, 2) int: pairs of nodes, the present topology. ``fixed`` and ``one-edge`` need it; ``exact`` begins
             with it where it cannot search everything; ``chain`` has no use for it. With ``idle``, nodes that are not
             ends may be missing.
-        ends: nodes that stay in the tree when others may idle. ``chain`` takes exactly two, and no other search looks at
+        ends: nodes that stay in the tree when others may idle. ``chain`` takes exactly two; no other search looks at
             them without ``idle``.
         idle: nodes that are not ends may be left out, at no cost. ``fixed`` then keeps the part of the tree that joins
             the ends, and ``one-edge`` that part of each modified tree; nodes missing in ``tree`` count as leaves at the
@@ -97,15 +101,15 @@ def redeploy(
         InvalidRedeployment: arguments as above, in one sentence.
         InvalidWeights: W is not a symmetric matrix of weights.
 
-    Complexity: ``fixed`` O(k N²); ``one-edge`` O(k² N²); ``exact`` O(3^(k−1) N + 2^(k−1) N²), for more than 12 different
-        nodes a few hundred times N²; ``chain`` as `planning.chain.chain_between`. The lower bound of ``fixed`` and
-        ``one-edge`` is that of `planning.redeployment_bound` without steps: 64 products, 64 N².
+    Complexity: ``fixed`` O(k N²); ``one-edge`` O(k² N²); both with a lower bound of O(64 N²), which is the optimum for
+        at most 7 nodes. ``exact`` O(3^(k−1) N + 2^(k−1) N²) time and O(2^k N) memory; more than 14 different nodes take
+        a few times as long as 12. ``chain`` as `planning.chain.chain_between`.
     """
     costs, weights = _checked_costs(move), checked_weights(W)
     number = len(costs)
     if costs.shape[1] != len(weights):
         raise InvalidRedeployment(
-            f"move has costs for {costs.shape[1]} placements and W has {len(weights)}: give both for the same placements"
+            f"move is for {costs.shape[1]} placements and W for {len(weights)}: give both for the same placements"
         )
     if not (isinstance(mu, int | float | np.number) and 0 <= mu < np.inf):
         raise InvalidRedeployment(f"mu is a finite number of at least 0, not {mu!r}")
@@ -117,7 +121,7 @@ def redeploy(
     if search == "chain":
         return _chain(links, costs, weights, float(mu), staying)
     if search == "exact":
-        return _exact(links, costs, weights, float(mu), staying, topology, EXACT_STATES)
+        return _exact(links, costs, weights, float(mu), staying, topology)
     if topology is None:
         raise InvalidRedeployment(f"a {search} search starts from a topology: give tree, or search='exact'")
     if search == "one-edge":
@@ -127,13 +131,11 @@ def redeploy(
     return _result(costs, weights, float(mu), placed, bound)
 
 
-def _exact(
-    links: Links, move: Floats, W: Floats, mu: float, ends: list[int], tree: Ints | None, most_states: int
-) -> Redeployment:
+def _exact(links: Links, move: Floats, W: Floats, mu: float, ends: list[int], tree: Ints | None) -> Redeployment:
     """The optimum where the states are not too many, else a search with a bound."""
-    counted = count_nodes(move, ends, most_states)
+    counted = count_nodes(move, ends, EXACT_STATES)
     if not counted.exact:
-        found = search_with_bound(links, move, ends, tree)
+        found = search_with_bound(links, move, ends, tree, RELAXED_STATES)
         placed = None if np.isinf(found.cost) else (found.edges, found.cells)
         return _result(move, W, mu, placed, found.lower_bound)
     relaxation = relax(links, move, counted, np.zeros(len(move)))
@@ -180,7 +182,7 @@ def _checked_costs(move: ArrayLike) -> Floats:
         raise InvalidRedeployment(f"move is a table of numbers, not {type(move).__name__}") from None
     if costs.ndim != 2 or costs.size == 0:
         raise InvalidRedeployment(
-            f"move has a row for each node and a column for each placement, at least one of each; its shape is {costs.shape}"
+            f"move has a row for each node and a column for each placement, at least one; its shape is {costs.shape}"
         )
     wrong = np.argwhere(~(costs >= 0))
     if len(wrong):

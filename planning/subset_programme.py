@@ -129,7 +129,8 @@ def solve_subsets(
     Complexity: O(3^(k−1) N + 2^(k−1) (k N + N²)) time and O(2^k N) memory for k nodes of as many kinds; less where
     kinds have several nodes.
     """
-    counts = np.indices([number + 1 for number in numbers]).reshape(len(numbers), states_of(numbers)).T.astype(np.int64)
+    digits = np.indices([number + 1 for number in numbers], dtype=np.int64).reshape(len(numbers), states_of(numbers))
+    counts = np.ascontiguousarray(digits.T)
     strides = np.array([states_of(numbers[kind + 1 :]) for kind in range(len(numbers))], dtype=np.int64)
     wanted = np.array(needed, dtype=np.bool_)
     sizes = np.where(counts[:, wanted].any(axis=1), counts.sum(axis=1), 0)
