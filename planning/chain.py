@@ -1,4 +1,4 @@
-"""The cheapest chain for robots that are already somewhere: who takes which place, in which order, and who none.
+"""The cheapest chain for robots that are already somewhere: who takes which place, in which order, and who takes none.
 
 Robots move to their places, so besides the weights of its links a chain costs what the robots drive. With c_j(v) what
 it costs that robot j is the relay in place v, the cheapest chain whose relays are the robots S, the last of them in v:
@@ -63,9 +63,10 @@ def cheapest_chain(W: Floats, move: Floats, from_base: Floats, to_agent: Floats,
         relay_cost: what every relay costs by itself, not negative; above 0, no two relays share a cell.
 
     Returns:
-        The cheapest chain, None if there is none, for at most :data:`MOST_IN_SUBSETS` robots, and for more if no more
-        than these can be part of a chain cheaper than the one known from the start. Else that one, or the cheapest in
-        the order of rows if that is better, None if neither exists.
+        The cheapest chain; None if the robots cannot form one. Of more than :data:`MOST_IN_SUBSETS` robots this is so
+        if no more than these can be part of a chain cheaper than the one known from the start. Otherwise the answer is
+        the better of that one and the cheapest in the order of rows (None if neither exists), and its lower bound says
+        how much may be missed.
 
     Complexity: O(2^k N² + 2^k k N) at worst, about O(k N²) where the bound is close. Beyond the thesis.
     """
