@@ -49,6 +49,7 @@ def exercise() -> None:
         cells.locate(points)
         weights = virtual_weights(cells, mutual_visibility(cells))
         all_pairs(weights)
+        all_pairs(np.triu(weights))
         from_source(weights, 0)
         steiner_tree(weights, [0, 1, 2, 3])
         fixed_size_programme(weights, [0, 1], 3)
