@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from estimation.ellipsoid import Ellipsoid
-from estimation.feasible_set import Region
+from estimation.ellipsoid import Ellipsoid, EmptyIntersection
+from estimation.feasible_set import FeasibleSet, Region
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,6 +26,7 @@ PROJECTION = "#c227b9"
 SLICE = "#2f4bd6"
 FEASIBLE = "#d1261f"
 TIGHT = "#f0a11c"
+BASELINE = "#7b8794"
 ROBOTS = ("#0b6b74", "#2f6b18")
 INK = "#22272e"
 
@@ -105,6 +106,16 @@ def draw_ellipse(axes: Axes, ellipse: Ellipsoid, colour: str, label: str, style:
     axes.plot(ring[0], ring[1], style, color=colour, linewidth=1.2, label=label, zorder=5)
 
 
+def draw_sets(axes: Axes, feasible: FeasibleSet, tight: Sequence[Floats]) -> None:
+    """Feasible set, base projection, tangent slice, and the tight set beside them."""
+    draw_ellipse(axes, feasible.base_projection(), PROJECTION, "base projection")
+    flat = feasible.tangent_slice()
+    if not isinstance(flat, EmptyIntersection):
+        draw_ellipse(axes, flat, SLICE, "tangent slice", ":")
+    draw_regions(axes, feasible.regions, FEASIBLE, "feasible set", alpha=0.3)
+    draw_regions(axes, [Region(piece) for piece in tight], TIGHT, "tight set", alpha=0.95, width=0.6)
+
+
 def draw_target(axes: Axes, place: ArrayLike) -> None:
     """A bold T, as in the thesis, beside a cross, so that small sets are not hidden."""
     x, y = np.asarray(place, dtype=float)
@@ -134,6 +145,8 @@ def dress_plane(axes: Axes, title: str, low: ArrayLike, high: ArrayLike) -> None
     (x0, y0), (x1, y1) = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
     axes.set(xlim=(x0, x1), ylim=(y0, y1), aspect="equal")
     axes.set_title(title, fontsize=9, loc="left", parse_math=False)
+    axes.set_xlabel("x [m]", fontsize=7, labelpad=1)
+    axes.set_ylabel("y [m]", fontsize=7, labelpad=0)
     axes.tick_params(labelsize=7, length=2)
 
 
@@ -151,12 +164,16 @@ def draw_spread(axes: Axes, across: ArrayLike, rows: Floats, colour: str, label:
     quartiles = np.full((3, rows.shape[1]), np.nan)
     known = ~np.isnan(rows).all(axis=0)
     quartiles[:, known] = np.nanquantile(rows[:, known], [0.25, 0.5, 0.75], axis=0)
-    axes.fill_between(across, quartiles[0], quartiles[2], color=colour, alpha=0.15, linewidth=0)
+    axes.fill_between(across, quartiles[0], quartiles[2], color=colour, alpha=0.11, linewidth=0)
     axes.plot(across, quartiles[1], style, color=colour, linewidth=1.6, label=label)
     return quartiles
 
 
-def legend_below(figure: Figure, axes: Axes, columns: int) -> None:
-    """One legend for the whole figure."""
-    handles, labels = axes.get_legend_handles_labels()
+def legend_below(figure: Figure, columns: int) -> None:
+    """One legend for the whole figure: every label of any of its axes, once."""
+    entries: dict[str, Any] = {}
+    for axes in figure.axes:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            entries.setdefault(label, handle)
+    handles, labels = list(entries.values()), list(entries)
     figure.legend(handles, labels, loc="outside lower center", ncols=columns, frameon=False, fontsize=8)

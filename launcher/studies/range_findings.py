@@ -28,6 +28,8 @@ Floats = NDArray[np.float64]
 PASSES = 5
 MARGIN = 1.15
 """What a learned bound is multiplied with: the largest of the errors seen understates those to come."""
+USUAL_SHARE = 0.99
+"""Share of the ranges that are not out of the ordinary."""
 LEARNED_SHARE = 0.2
 """Part of the time on which a moving node's offsets are learned."""
 
@@ -40,6 +42,7 @@ class BeaconFinding:
         beacon: its name.
         place: (2,) float, metres, its true place.
         scale, offset_m, bound_m: how its ranges were read.
+        usual_m: the bound that 99 % of the ranges of the other beacons keep; far below ε, a few decide that.
         ranges: how many.
         feasible: the ellipsoid's set after all passes.
         tight: polygons of the tight set.
@@ -47,7 +50,7 @@ class BeaconFinding:
         solved: (2,) float, metres: least squares from the tight set.
         tight_m2: area of the tight set.
         inside, tight_inside: whether they hold the true place.
-        verdict: of the monitor over the tight set.
+        verdict: of the monitor over the tight set, where it was most alarmed.
     """
 
     beacon: str
@@ -55,6 +58,7 @@ class BeaconFinding:
     scale: float
     offset_m: float
     bound_m: float
+    usual_m: float
     ranges: int
     feasible: FeasibleSet
     tight: tuple[Floats, ...]
@@ -89,7 +93,7 @@ class TargetFinding:
         inside, tight_inside: (k,) bool.
         rejected: ranges that the ellipsoid rejected.
         ranges: ranges in all.
-        verdict: of the monitor over the tight set.
+        verdict: of the monitor over the tight set, where it was most alarmed.
     """
 
     bound_m: float
@@ -141,7 +145,7 @@ def _find_beacon(data: RangeData, name: str, bound_m: float | None) -> BeaconFin
         for anchor, z in zip(anchors, read, strict=True):
             ellipsoid.measure(anchor, float(z), bound)
             if number == 0:
-                verdict = _watch(monitor, tight, anchor, float(z), bound)
+                verdict = _graver(verdict, _watch(monitor, tight, anchor, float(z), bound))
                 tight.measure(anchor, float(z), bound)
     feasible, place = ellipsoid.feasible_set(), data.beacons[name]
     return BeaconFinding(
@@ -150,6 +154,7 @@ def _find_beacon(data: RangeData, name: str, bound_m: float | None) -> BeaconFin
         learned.scale,
         learned.offset_m,
         bound,
+        calibrate(data.distances[~own], data.ranges[~own], coverage=USUAL_SHARE).bound_m,
         int(own.sum()),
         feasible,
         tight.polygons,
@@ -178,6 +183,10 @@ def _watch(monitor: ContainmentMonitor, tight: TightSet, anchor: Floats, z: floa
         return monitor.verdict()
     nearest, farthest = measure_polygons(tight.polygons, anchor)
     return monitor.observe(z, bound, nearest, farthest)
+
+
+def _graver(one: Verdict, other: Verdict) -> Verdict:
+    return other if other.chance < one.chance else one
 
 
 def measure_polygons(polygons: tuple[Floats, ...], point: Floats) -> tuple[float, float]:
@@ -230,7 +239,7 @@ def find_target(data: RangeData, speed_m_s: float, bound_m: float | None = None)
         last_s, name = data.times[index], str(data.names[index])
         z = max(0.0, float(data.ranges[index]) + offsets[name])
         anchor = data.beacons[name]
-        verdict = _watch(monitor, tight, anchor, z, bound)
+        verdict = _graver(verdict, _watch(monitor, tight, anchor, z, bound))
         rejected += ellipsoid.measure(anchor, z, bound).empty
         tight.measure(anchor, z, bound)
         if place + 1 == len(late) or data.times[late[place + 1]] > last_s:

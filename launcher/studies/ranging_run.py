@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.ellipsoid import Ellipsoid
 from estimation.feasible_set import FeasibleSet
 from estimation.information_control import covariance_direction, information_gradient
 from estimation.information_filter import InformationFilter
@@ -98,6 +99,8 @@ LAWS: Mapping[str, Law] = {
 }
 STRAIGHT = "straight line"
 """Not a law: every robot drives past the target at 1 to 3 m, whatever it hears."""
+THROUGH = "line through the target"
+"""The same at 0 m: as near as it gets, and no range tells anything across the line."""
 
 
 @dataclass(frozen=True)
@@ -110,6 +113,7 @@ class Scene:
         ranges: (robots,) float, metres.
         feasible: the ellipsoid's set after the step.
         tight: the tight set after it.
+        thesis: base projection of the thesis' filter after it; None while it is unbounded or E bounds no set.
     """
 
     places: Floats
@@ -117,12 +121,11 @@ class Scene:
     ranges: Floats
     feasible: FeasibleSet
     tight: tuple[Floats, ...]
+    thesis: Ellipsoid | None
 
 
 SERIES = (
-    "weight",
     "log10_det",
-    "thesis_weight",
     "thesis_det",
     "thesis_definite",
     "area_m2",
@@ -148,11 +151,15 @@ class Run:
     Attributes:
         target: (2,) float, metres.
         series: (steps, len(SERIES)) float, one row per step; see :data:`SERIES`.
+        weights: (steps, robots) float, λ of every range in our filter.
+        thesis_weights: (steps, robots) float, the same in the thesis' filter.
         scenes: of every step, where asked for.
     """
 
     target: Floats
     series: Floats
+    weights: Floats
+    thesis_weights: Floats
     scenes: tuple[Scene, ...]
 
     def __getitem__(self, name: str) -> Floats:
@@ -172,7 +179,7 @@ def run_experiment(
 
     Args:
         experiment: who takes part.
-        law: a key of LAWS, or STRAIGHT.
+        law: a key of LAWS, STRAIGHT or THROUGH.
         seed: decides starts and noise; the same for every law, so that runs can be compared one by one.
         corrupt: in step CORRUPT_STEP the first robot's position is FLAW_M off, as in fig. 12.
         steps: ranges per robot.
@@ -184,46 +191,52 @@ def run_experiment(
     bearings, radii = rng.uniform(0, 2 * np.pi, robots), rng.uniform(5, 8, robots)
     places = target + radii[:, None] * np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
     passing = np.arcsin(rng.uniform(1, 3, robots) / radii) * rng.choice([-1, 1], robots)
-    straight = np.stack([np.cos(bearings + np.pi + passing), np.sin(bearings + np.pi + passing)], axis=1)
+    course = bearings + np.pi + (passing if law != THROUGH else 0.0)
+    straight = np.stack([np.cos(course), np.sin(course)], axis=1)
     noise = rng.uniform(-BOUND_M, BOUND_M, (steps, robots))
     guess_at = float(rng.uniform(0, 2 * np.pi))
     belief = Belief()
     rows, scenes = [], []
+    weights, thesis_weights = np.empty((steps, robots)), np.empty((steps, robots))
     for step in range(steps):
         claimed = places.copy()
         if corrupt and step == CORRUPT_STEP:
             away = places[0] - target
             claimed[0] += FLAW_M * away / np.hypot(*away)
         ranges = np.hypot(*(places - target).T) + noise[step]
-        row = _measure(belief, claimed, ranges, guess_at)
+        row, weights[step], thesis_weights[step] = _measure(belief, claimed, ranges, guess_at)
         row.update(_judge(belief, places, target))
         rows.append([row[name] for name in SERIES])
         if keep_scenes:
-            feasible = belief.ellipsoid.feasible_set()
-            scenes.append(Scene(places.copy(), claimed, ranges, feasible, belief.tight.polygons))
+            feasible, thesis = belief.ellipsoid.feasible_set(), belief.thesis.ellipsoid()
+            shadow = thesis.project(2) if thesis is not None and thesis.bounded else None
+            scenes.append(Scene(places.copy(), claimed, ranges, feasible, belief.tight.polygons, shadow))
         for robot in range(experiment.moving):
-            move = straight[robot] if law == STRAIGHT else LAWS[law](belief, places[robot], robot)
+            move = straight[robot] if law in (STRAIGHT, THROUGH) else LAWS[law](belief, places[robot], robot)
             places[robot] = places[robot] + STEP_M * move
-    return Run(target, np.array(rows), tuple(scenes))
+    return Run(target, np.array(rows), weights, thesis_weights, tuple(scenes))
 
 
-def _measure(belief: Belief, claimed: Floats, ranges: Floats, guess_at: float) -> dict[str, float]:
-    """Tell all sets the ranges of one step; what the last of them did."""
+def _measure(
+    belief: Belief, claimed: Floats, ranges: Floats, guess_at: float
+) -> tuple[dict[str, float], list[float], list[float]]:
+    """Tell all sets the ranges of one step: what the last one left, and λ of each in our filter and the thesis'."""
     if not belief.gaussian.known:
         # A Gaussian needs a guess. The first range says how far, nothing says where: any bearing is as good.
         guess = claimed[0] + ranges[0] * np.array([np.cos(guess_at), np.sin(guess_at)])
         belief.gaussian = InformationFilter.from_guess(guess, ranges[0] ** 2 * np.eye(2))
     row: dict[str, float] = {}
+    weights, thesis_weights = [], []
     for place, measured in zip(claimed, ranges, strict=True):
         z = max(0.0, float(measured))
-        row["weight"] = belief.ellipsoid.measure(place, z, BOUND_M).weight
+        weights.append(belief.ellipsoid.measure(place, z, BOUND_M).weight)
         report = belief.thesis.measure(place, z, BOUND_M)
-        row["thesis_weight"], row["thesis_det"] = report.weight, report.determinant
-        row["thesis_definite"] = float(report.definite)
+        thesis_weights.append(report.weight)
+        row["thesis_det"], row["thesis_definite"] = report.determinant, float(report.definite)
         belief.tight.measure(place, z, BOUND_M)
         belief.relaxed.measure(place, z, BOUND_M)
         belief.gaussian = belief.gaussian.measure([place], [z], BOUND_M / math.sqrt(3))
-    return row
+    return row, weights, thesis_weights
 
 
 def _judge(belief: Belief, places: Floats, target: Floats) -> dict[str, float]:
