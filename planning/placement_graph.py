@@ -88,6 +88,7 @@ class PlacementGraph:
         environment: Environment,
         radius_m: float,
         *,
+        weights: ArrayLike | None = None,
         containing: ArrayLike | None = None,
     ) -> PlacementGraph:
         """A placement for each cell that a robot can stand in.
@@ -97,6 +98,8 @@ class PlacementGraph:
             seen: their mutual visibility, (number of cells)² bool.
             environment: the map as drawn.
             radius_m: of the robots, metres.
+            weights: of the links between all cells, as :func:`~planning.edge_weights.virtual_weights` makes them. None:
+                the normalised ones.
             containing: (2,) metres: robots are in the part of the free space at this point. None: in the largest.
 
         Raises:
@@ -110,11 +113,11 @@ class PlacementGraph:
         kept = np.flatnonzero(~np.isnan(positions[:, 0]))
         if len(kept) == 0:
             raise NoPlacement(f"a robot of radius {radius_m:g} m can stand in no cell of the map {environment.name!r}")
-        weights = virtual_weights(cells, seen)
-        among = np.ascontiguousarray(weights[np.ix_(kept, kept)])
+        between = virtual_weights(cells, seen) if weights is None else np.asarray(weights, dtype=np.float64)
+        among = np.ascontiguousarray(between[np.ix_(kept, kept)])
         return cls(
             "cells", environment, radius_m, free, positions[kept], np.isfinite(among), among, kept,
-            CellSight(cells, weights, kept),
+            CellSight(cells, between, kept),
         )  # fmt: skip
 
     @classmethod
