@@ -200,7 +200,7 @@ class DeploymentPlanner:
         different = {proposal.relays: proposal for proposal in reversed(new)}
         worth = {relays: outlook.worth(relays) for relays in different}
         best = max(worth, key=lambda relays: worth[relays])
-        if standing is None or worth[best] > outlook.worth(standing.relays) + KEEPING_S:
+        if standing is None or not standing.complete or worth[best] > outlook.worth(standing.relays) + KEEPING_S:
             return different[best]
         return standing
 

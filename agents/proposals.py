@@ -163,7 +163,7 @@ class Proposer:
         found = redeploy(costs, W, search=search, tree=tree, ends=(BASE, AGENT), idle=True)
         if found.tree is None:
             return None
-        between = _between(found.tree)
+        between = path_between(found.tree)
         stops = [int(found.cells[node]) for node in between]
         # Where two would stand in one place, one will do.
         kept = [index for index, stop in enumerate(stops) if index == 0 or stop != stops[index - 1]]
@@ -223,7 +223,7 @@ def _tree(order: Sequence[str], standing: Sequence[str]) -> Ints:
     return np.array([*pairwise(chain), *((AGENT, spare) for spare in spares)], dtype=np.int64)
 
 
-def _between(tree: Ints) -> list[int]:
+def path_between(tree: Ints) -> list[int]:
     """Nodes on the tree's path from the base to the agent, without these."""
     before = {BASE: BASE}
     reached = [BASE]

@@ -110,6 +110,10 @@ class TopologyChange(msgspec.Struct, frozen=True, kw_only=True):
     time_s: float
     decision: int
     reason: str
+    total_cost_m: float | None = None
+    """Of the chain, in metres, as the leader counted it."""
+    lower_bound_m: float | None = None
+    """No chain would have cost less."""
 
 
 class Overlap(msgspec.Struct, frozen=True, kw_only=True):
@@ -181,7 +185,13 @@ def measure(trace: MissionTrace, environment: Environment) -> Metrics:
         planning=_planning_times(trace.planning_s),
         decisions=len(deployments),
         topology_changes=tuple(
-            TopologyChange(time_s=time_s, decision=decision.deployment.decision, reason=decision.deployment.reason)
+            TopologyChange(
+                time_s=time_s,
+                decision=decision.deployment.decision,
+                reason=decision.deployment.reason,
+                total_cost_m=decision.deployment.total_cost_m,
+                lower_bound_m=decision.deployment.lower_bound_m,
+            )
             for time_s, decision in trace.decisions
             if decision.topology_changed
         ),
@@ -318,11 +328,16 @@ def render(metrics: Metrics) -> Group:
         figures.add_row(title, value)
     parts: list[Table] = [shares, figures]
     if metrics.topology_changes:
-        changes = Table("time", "decision", "reason", title="Topology changes")
+        changes = Table("time", "decision", "reason", "cost", "at least", title="Topology changes")
         for change in metrics.topology_changes:
-            changes.add_row(f"{change.time_s:.2f} s", str(change.decision), change.reason)
+            costs = (_metres(change.total_cost_m), _metres(change.lower_bound_m))
+            changes.add_row(f"{change.time_s:.2f} s", str(change.decision), change.reason, *costs)
         parts.append(changes)
     return Group(*parts)
+
+
+def _metres(length_m: float | None) -> str:
+    return "-" if length_m is None else f"{length_m:.1f} m"
 
 
 def _percent(shares: Shares, key: str) -> str:

@@ -1,0 +1,173 @@
+"""Proposals of every search on both kinds of placements, their costs added up anew and against the engine's own."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from itertools import pairwise
+from typing import get_args
+
+import networkx as nx
+import numpy as np
+import pytest
+
+import maps
+from agents.leader import DeploymentPlanner, PlacementKind, Plan
+from agents.proposals import LATENESS, METRES_PER_WEIGHT, RELAY_M, path_between
+from planning.environment import Environment
+from planning.foresight import chain_holds
+from planning.redeployment import Search, redeploy
+from protocol.messages import Point
+
+BASE = (1.5, 11.0)
+RADIUS_M = 0.2
+KINDS = get_args(PlacementKind)
+SEARCHES = get_args(Search)
+
+
+@cache
+def _office() -> Environment:
+    return Environment.load(maps.path("office"))
+
+
+@cache
+def _planner(kind: PlacementKind, search: Search) -> DeploymentPlanner:
+    return DeploymentPlanner(_office(), BASE, RADIUS_M, "inflection", placements=kind, search=search)
+
+
+def _places(number: int, seed: int) -> list[Point]:
+    free = _office().inflated(RADIUS_M, containing=BASE)
+    points = np.random.default_rng(seed).uniform(free.bounds[:2], free.bounds[2:], (40 * number + 200, 2))
+    return [(float(x), float(y)) for x, y in points[free.contains(points)][:number]]
+
+
+def _team(places: list[Point]) -> dict[str, Point]:
+    return {f"robot{number}": place for number, place in enumerate(places, 1)}
+
+
+def _relays(plan: Plan) -> list[tuple[str, Point]]:
+    return [(place.robot, place.position) for place in plan.placements if not place.spare]
+
+
+def _links(kind: PlacementKind, stops: list[Point]) -> list[float]:
+    """Virtual weights of a chain's links, by the graph alone."""
+    graph = _planner(kind, "chain").graph
+    return [float(graph.direct_weights(p, [q])[0]) for p, q in pairwise(stops)]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("seed", range(4))
+def test_a_plan_costs_what_its_robots_drive_and_its_links_weigh(kind: PlacementKind, seed: int) -> None:
+    """An agent at rest is already where it is, so every metre counts as late."""
+    agent, *starts = _places(7, seed)
+    robots = _team(starts)
+    planner = _planner(kind, "chain")
+    plan = planner.plan(agent, (), robots, None)
+    relays = _relays(plan)
+    links = _links(kind, [BASE, *(place for _, place in relays), agent])
+    driven = [planner.graph.geodesics.length(robots[name], place) for name, place in relays]
+    assert plan.cost == pytest.approx(sum(links))
+    assert plan.total_cost_m == pytest.approx(
+        (1.0 + LATENESS) * sum(driven) + RELAY_M * len(relays) + METRES_PER_WEIGHT * sum(links)
+    )
+    assert plan.lower_bound_m == plan.total_cost_m
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("seed", range(3))
+def test_the_plan_of_the_exact_search_costs_what_redeploy_says(kind: PlacementKind, seed: int) -> None:
+    planner = _planner(kind, "exact")
+    graph = planner.graph
+    places = _places(30, 20 + seed)
+    agent = next(place for place in places if planner.relays_needed(place) >= 2)
+    robots = _team(places[-4:])
+    size = len(graph)
+    W = np.full((size + 2, size + 2), np.inf)
+    W[2:, 2:] = graph.weights
+    for end, place in enumerate((BASE, agent)):
+        W[end, 2:] = W[2:, end] = graph.link_weights(place)
+    move = np.full((2 + len(robots), size + 2), np.inf)
+    move[0, 0] = move[1, 1] = 0.0
+    for row, place in enumerate(robots.values(), 2):
+        move[row, 2:] = (1.0 + LATENESS) * graph.distances_from(place) + RELAY_M
+    expected = redeploy(move, W, mu=METRES_PER_WEIGHT, search="exact", idle=True)
+    plan = planner.plan(agent, (), robots, None)
+    assert plan.total_cost_m == pytest.approx(expected.cost)
+    assert plan.lower_bound_m == pytest.approx(expected.lower_bound) == pytest.approx(expected.cost)
+    assert plan.total_cost_m == pytest.approx(_planner(kind, "chain").plan(agent, (), robots, None).total_cost_m)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("search", SEARCHES)
+def test_every_search_keeps_a_team_joined_to_its_agent(kind: PlacementKind, search: Search) -> None:
+    """From plan to plan, robots having arrived in between; the bound is a bound, and better searches cost no more."""
+    planner = _planner(kind, search)
+    robots = _team(_places(planner.most_relays_needed() + 1, 30))
+    plan: Plan | None = None
+    for agent in _places(6, 31):
+        plan = planner.plan(agent, (), robots, plan)
+        assert plan.serves
+        stops = [BASE, *(place for _, place in _relays(plan)), agent]
+        assert chain_holds(_office(), np.array([stops]))[0]
+        assert len({name for name, _ in _relays(plan)}) == len(_relays(plan))
+        assert plan.total_cost_m is not None and plan.lower_bound_m is not None
+        assert 0.0 <= plan.lower_bound_m <= plan.total_cost_m * (1.0 + 1e-9) < math.inf
+        robots = {place.robot: place.position for place in plan.placements}
+
+
+SNAKE = Environment(
+    [(0, 0), (10, 0), (10, 8), (16, 8), (16, 0), (18, 0), (18, 10), (8, 10), (8, 2), (0, 2)], name="snake"
+)
+"""Four corridors of 2 m: the base in the first, and one relay more for each corner."""
+CORRIDORS: list[Point] = [(9.0, 6.0), (14.0, 9.0), (17.0, 4.0)]
+
+
+def _follow(search: Search, agents: list[Point]) -> list[Plan]:
+    """Plans for an agent that is at one place after the other, robots having arrived in between."""
+    planner = DeploymentPlanner(SNAKE, (1.0, 1.0), RADIUS_M, "inflection", placements="points", search=search)
+    robots = _team([(1.0, 0.5), (1.5, 0.5), (2.0, 0.5), (2.5, 0.5)])
+    plans: list[Plan] = []
+    for agent in agents:
+        plans.append(planner.plan(agent, (), robots, plans[-1] if plans else None))
+        robots = {place.robot: place.position for place in plans[-1].placements}
+    return plans
+
+
+def test_one_edge_makes_a_spare_the_last_relay_and_back() -> None:
+    """At every corner the standing chain stays, in its order, and grows by a robot; on the way back it is cut short."""
+    plans = _follow("one-edge", [*CORRIDORS, *reversed(CORRIDORS)])
+    chains = [[name for name, _ in _relays(plan)] for plan in plans]
+    assert [len(chain) for chain in chains[:3]] == [1, 2, 3]
+    for before, after in pairwise(chains):
+        shorter, longer = sorted((before, after), key=len)
+        assert [name for name in longer if name in shorter] == shorter
+
+
+def test_the_fixed_search_keeps_relays_and_their_order() -> None:
+    there, back = _follow("fixed", [(17.0, 4.0), (17.0, 6.0)])
+    assert [name for name, _ in _relays(there)] == [name for name, _ in _relays(back)]
+    assert len(_relays(back)) == 3
+
+
+def test_a_tree_that_cannot_serve_is_replaced_by_a_new_chain() -> None:
+    """One relay cannot see around two corners, and the fixed search takes no other to it."""
+    for fixed, chain in zip(_follow("fixed", CORRIDORS), _follow("chain", CORRIDORS), strict=True):
+        assert fixed.total_cost_m == pytest.approx(chain.total_cost_m)
+        assert _relays(fixed) == _relays(chain)
+
+
+def test_points_need_no_more_robots_than_cells_and_sometimes_fewer() -> None:
+    points, cells = _planner("points", "chain"), _planner("cells", "chain")
+    needed = [(points.relays_needed(place), cells.relays_needed(place)) for place in _places(40, 5)]
+    assert all(fewer <= more for fewer, more in needed)
+    assert any(fewer < more for fewer, more in needed)
+    assert points.most_relays_needed() < cells.most_relays_needed()
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_chain_in_a_tree_is_its_path(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    number = int(rng.integers(2, 9))
+    tree = nx.random_labeled_tree(number, seed=seed)
+    expected = nx.shortest_path(tree, 0, 1)[1:-1]
+    assert path_between(np.array(tree.edges)) == expected
