@@ -12,7 +12,6 @@ def exercise() -> None:
     from planning.decomposition import decompose
     from planning.edge_weights import virtual_weights
     from planning.environment import Environment
-    from planning.fixed_size_steiner import fixed_size_programme
     from planning.foresight import chain_holds
     from planning.geodesic import GeodesicMap
     from planning.grid_outline import outline
@@ -52,7 +51,6 @@ def exercise() -> None:
         all_pairs(np.triu(weights))
         from_source(weights, 0)
         steiner_tree(weights, [0, 1, 2, 3])
-        fixed_size_programme(weights, [0, 1], 3)
         cheapest_chain(weights, np.ones((2, len(weights))), weights[0], weights[-1], 1.0)
         redeploy(
             np.ones((5, len(weights))) * np.arange(5)[:, None],

@@ -85,9 +85,7 @@ def least_cost(W: Floats, terminals: Sequence[int], standing: Bools | None = Non
     )
 
 
-def least_cost_of_size(W: Floats, terminals: Sequence[int], robots: int, node_cost: Floats) -> float:
-    """Cost of the fixed-size Steiner tree, over all placements of the robots, and of standing there."""
-    return min(
-        spanning_cost(W, [*terminals, *chosen]) + float(node_cost[list(chosen)].sum())
-        for chosen in combinations_with_replacement(range(len(W)), robots)
-    )
+def least_cost_of_size(W: Floats, terminals: Sequence[int], robots: int, standing: Bools) -> float:
+    """Cost of the fixed-size Steiner tree, over all placements of the robots."""
+    chosen = combinations_with_replacement(np.flatnonzero(standing).tolist(), robots)
+    return min((spanning_cost(W, [*terminals, *cells]) for cells in chosen), default=np.inf)
