@@ -152,7 +152,7 @@ def draw_fusion(run: Run, title: str, file: Path, close_up: tuple[int, int] | No
         )
         upper.set_ylim(-0.05, 1.05)
         for axes in (upper, lower):
-            axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+            axes.xaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
     drawing.legend_below(figure, 4)
     return drawing.write_figure(figure, file)
 

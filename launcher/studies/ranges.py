@@ -135,7 +135,7 @@ def _draw_beacons(data: RangeData, found: list[BeaconFinding], file: Path) -> No
         middle, half = 0.5 * (low + high), 0.55 * float((high - low).max())
         title = f"beacon {one.beacon}: feasible {one.feasible.area_m2:.1f}, tight {one.tight_m2:.2f} m²"
         drawing.dress_plane(axes, title, middle - half, middle + half)
-    drawing.legend_below(figure, 6)
+    drawing.legend_below(figure, 7)
     drawing.write_figure(figure, file)
 
 

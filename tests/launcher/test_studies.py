@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import os
+import re
 from pathlib import Path
 
 import numpy as np
@@ -227,3 +228,23 @@ def test_the_study_in_short(tmp_path, monkeypatch):
     assert len(told) == 3 * 4 + 3
     with pytest.raises(BadStudy, match="at least 2 runs"):
         study_localization(tmp_path, 1)
+
+
+def test_the_example_of_the_page_says_what_comes_out():
+    """Every line of docs/estimation.md's example that promises a number or True in its comment."""
+    page = (Path(__file__).parents[2] / "docs" / "estimation.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    names: dict[str, object] = {}
+    promised = []
+    for line in example.splitlines():
+        code, _, comment = line.partition("  # ")
+        said = re.match(r"(True|[\d.]+)\b", comment)
+        if said and "=" not in code:
+            promised.append((eval(code, names), said[1]))
+        else:
+            exec(code, names)
+    assert len(promised) == 5
+    for value, said in promised:
+        assert value if said == "True" else value == pytest.approx(float(said), rel=0.02)
+    grown = re.search(r"half a metre: ([\d.]+) m²", example)[1]
+    assert names["f"].feasible_set().area_m2 == pytest.approx(float(grown), rel=0.02)
