@@ -31,7 +31,7 @@ from planning.edge_modification import best_modification
 from planning.iterated_modification import search_with_bound
 from planning.known_topology import neighbours_of, place_nodes
 from planning.min_plus import Links, scaled_links
-from planning.redeployment_bound import count_nodes, name_nodes, relax
+from planning.redeployment_bound import bound_below, count_nodes, name_nodes, relax
 from planning.subset_programme import ROOT
 from planning.tree import Floats, Ints, checked_weights
 
@@ -43,8 +43,8 @@ EXACT_STATES: Final = 2**13
 RELAXED_STATES: Final = 2**11
 """States of its relaxation where it is not."""
 
-BOUND_STATES: Final = 2**6
-"""States that the lower bound of the other searches may take: 7 nodes exactly, more counted together."""
+BOUND_STATES: Final = 2**5
+"""States that the lower bound of the other searches may take: 6 nodes are told apart, of more some counted together."""
 
 
 class InvalidRedeployment(ValueError):
@@ -101,8 +101,8 @@ def redeploy(
         InvalidRedeployment: arguments as above, in one sentence.
         InvalidWeights: W is not a symmetric matrix of weights.
 
-    Complexity: ``fixed`` O(k N²); ``one-edge`` O(k² N²); both with a lower bound of O(64 N²), which is the optimum for
-        at most 7 nodes. ``exact`` O(3^(k−1) N + 2^(k−1) N²) time and O(2^k N) memory; more than 14 different nodes take
+    Complexity: ``fixed`` O(k N²); ``one-edge`` O(k² N²); both with a lower bound of O(32 N²), which is the optimum for
+        at most 6 nodes. ``exact`` O(3^(k−1) N + 2^(k−1) N²) time and O(2^k N) memory; more than 14 different nodes take
         a few times as long as 12. ``chain`` as `planning.chain.chain_between`.
     """
     costs, weights = _checked_costs(move), checked_weights(W)
@@ -126,7 +126,7 @@ def redeploy(
         raise InvalidRedeployment(f"a {search} search starts from a topology: give tree, or search='exact'")
     if search == "one-edge":
         _, topology = best_modification(links, costs, topology, staying)
-    bound = relax(links, costs, count_nodes(costs, staying, BOUND_STATES), np.zeros(number)).bound
+    bound = bound_below(links, costs, staying, BOUND_STATES)
     placed = place_nodes(links, costs, topology, staying)
     return _result(costs, weights, float(mu), placed, bound)
 
@@ -156,8 +156,7 @@ def _chain(links: Links, move: Floats, W: Floats, mu: float, ends: list[int]) ->
     np.fill_diagonal(scaled, 0.0)
     chain = chain_between(move, scaled, (ends[0], ends[1]))
     if chain is None:
-        bound = relax(links, move, count_nodes(move, ends, BOUND_STATES), np.zeros(len(move))).bound
-        return _result(move, W, mu, None, bound)
+        return _result(move, W, mu, None, bound_below(links, move, ends, BOUND_STATES))
     cells = np.full(len(move), -1, dtype=np.int64)
     cells[list(chain.robots)] = chain.cells
     edges = np.array([chain.robots[:-1], chain.robots[1:]], dtype=np.int64).T

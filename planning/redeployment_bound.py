@@ -30,7 +30,7 @@ import numpy as np
 
 from planning.deployment import identify_robots
 from planning.min_plus import Links
-from planning.subset_programme import ROOT, PlacedTree, solve_subsets, states_of
+from planning.subset_programme import ROOT, PlacedTree, SubsetProgramme, solve_subsets, states_of
 from planning.tree import Floats
 
 ROUNDING: Final = 1e-12
@@ -111,10 +111,7 @@ def relax(links: Links, move: Floats, counted: Counted, prices: Floats) -> Relax
     Complexity: that of `planning.subset_programme.solve_subsets`.
     """
     reduced = move - prices[:, None]
-    costs = np.array([reduced[kind].min(axis=0) for kind in counted.kinds]).reshape(-1, links.number)
-    programme = solve_subsets(
-        links, reduced[counted.root], costs, [len(kind) for kind in counted.kinds], counted.needed
-    )
+    programme = _solve(links, reduced, counted)
     if np.isinf(programme.cost):
         return Relaxation(np.inf, PlacedTree([], [], []), [])
     tree = programme.tree()
@@ -122,8 +119,32 @@ def relax(links: Links, move: Floats, counted: Counted, prices: Floats) -> Relax
     for kind, cell in zip(tree.kinds[1:], tree.cells[1:], strict=True):
         members = counted.kinds[kind]
         used.append(members[int(np.argmin(reduced[members, cell]))])
-    slack = ROUNDING * (abs(programme.cost) + float(np.abs(prices).sum()))
-    return Relaxation(programme.cost + float(prices.sum()) - slack, tree, used)
+    return Relaxation(_lowered(programme.cost, prices), tree, used)
+
+
+def bound_below(links: Links, move: Floats, ends: list[int], most_states: int) -> float:
+    """What no tree costs less than, at no prices; inf if there is no tree.
+
+    Args:
+        links: of N placements.
+        move: (k, N) float, not negative.
+        ends: nodes that are needed.
+        most_states: of the programme; where it can tell all nodes apart, the bound is the optimum less rounding.
+    """
+    programme = _solve(links, move, count_nodes(move, ends, most_states))
+    return _lowered(programme.cost, np.zeros(len(move)))
+
+
+def _solve(links: Links, costs: Floats, counted: Counted) -> SubsetProgramme:
+    cheapest = np.array([costs[kind].min(axis=0) for kind in counted.kinds]).reshape(-1, links.number)
+    return solve_subsets(links, costs[counted.root], cheapest, [len(kind) for kind in counted.kinds], counted.needed)
+
+
+def _lowered(cost: float, prices: Floats) -> float:
+    """The bound that a relaxed cost stands for, less what rounding may have added."""
+    if np.isinf(cost):
+        return np.inf
+    return cost + float(prices.sum()) - ROUNDING * (abs(cost) + float(np.abs(prices).sum()))
 
 
 def name_nodes(move: Floats, counted: Counted, tree: PlacedTree) -> list[int]:
