@@ -136,6 +136,8 @@ def decisions() -> Iterator[tuple[float, AnyRecord]]:
                         ),
                         edges=edges,
                         cost=1.5,
+                        total_cost_m=None if step < 40 else 11.0 + step // 40,
+                        lower_bound_m=None if step < 40 else 12.0,
                         relays_needed=1,
                         reason=f"{relay} sees the agent for longer; \N{GREEK SMALL LETTER LAMDA}2 “quoted”",
                     ),

@@ -220,10 +220,18 @@ def test_a_plan_that_does_not_serve_is_said_once(team: Team) -> None:
 
 
 def test_a_plan_without_a_chain_can_be_said(team: Team) -> None:
-    team.oracle.answer = replace(plan(edges=(), serves=False), cost=math.inf)
+    team.oracle.answer = replace(plan(edges=(), serves=False), cost=math.inf, total_cost_m=math.inf)
     team.go_on(0.5)
+    assert (team.deployments[0][1].total_cost_m, team.deployments[0][1].lower_bound_m) == (None, None)
     envelope = Envelope(sender="base", incarnation=0, sequence=0, sent_at_s=0.0, body=team.deployments[0][1])
     assert decode(encode(envelope)) == envelope
+
+
+def test_a_decision_carries_its_cost_and_the_bound(team: Team) -> None:
+    team.oracle.answer = replace(plan(), total_cost_m=7.5, lower_bound_m=7.0)
+    team.go_on(0.5)
+    (decision,) = team.decisions
+    assert (decision.deployment.total_cost_m, decision.deployment.lower_bound_m) == (7.5, 7.0)
 
 
 def test_an_incarnation_that_starts_later_outranks_those_before(mission: Mission, corner: Environment) -> None:

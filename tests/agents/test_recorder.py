@@ -141,13 +141,26 @@ def test_curves(file: Path) -> None:
     assert all(chain == float(step % 7 != 0) for step, (_, (_, chain, _)) in enumerate(connected))
     assert [value for _, (value,) in rows(file, "/lambda2", "Scalars:scalars")][:6] == [0.0, 0.25, 0.5, 0.75, 1.0, 0.0]
     assert [value for _, (value,) in rows(file, "/planning_ms", "Scalars:scalars")] == pytest.approx([10.0, 50.0, 90.0])
+    assert [values for _, values in rows(file, "/cost", "Scalars:scalars")] == [[12.0, 12.0], [13.0, 12.0]]
 
 
 def test_the_tree_shows_everybody_and_the_log_the_reasons(file: Path) -> None:
     trees = rows(file, "/tree", "GraphNodes:node_ids")
     assert [set(nodes) for _, nodes in trees] == [{"base", "robot_1", "robot_2", "agent"}] * 3
     texts = [text for _, (text,) in rows(file, "/log/base", "TextLog:text")]
-    assert texts[1] == "base: decision 2 (new tree, 50 ms): robot_2 sees the agent for longer; λ2 “quoted”"
+    reason = "robot_2 sees the agent for longer; λ2 “quoted”"
+    assert texts[1] == f"base: decision 2 (new tree, 50 ms): {reason}; costs 12.0 m, the least"
+    assert texts[2].endswith("; costs 13.0 m, at least 12.0 m were needed")
+    assert "costs" not in texts[0]
+
+
+def test_the_map_shows_where_relays_can_be_sent(tmp_path: Path) -> None:
+    recorder = RerunRecorder(tmp_path / "map.rrd", team="demo", recording_id="run", peer="base")
+    recorder.log_map(synthetic.environment(), placements=np.array([[1.0, 2.0], [3.0, 4.0]]))
+    recorder.close()
+    assert rows(tmp_path / "map.rrd", "/world/map/placements", "Points2D:positions") == [
+        (None, [[1.0, 2.0], [3.0, 4.0]])
+    ]
 
 
 def test_the_view_mirrors_y_up_into_y_down(file: Path) -> None:

@@ -12,6 +12,7 @@ import pytest
 from agents.mission import Mission, Scripted, Wandering
 from launcher.preparation import Preparation, prepare
 from launcher.scenario import ScenarioFault, find_scenario, packaged, read_scenario
+from planning.placement_graph import PlacementGraph
 
 # Two rooms of 8 m by 6 m, joined by a door 1 m wide and 1 m deep at y 2.5 to 3.5.
 TWO_ROOMS = """{"name": "two rooms", "units": "metres", "holes": [], "outer": [
@@ -28,6 +29,8 @@ goals = [[6, 3], [12, 1]]
 [robots]
 count = 3
 """
+
+CELLS = '\n[planning]\nplacements = "cells"\n'
 
 Write = Callable[[str], Path]
 
@@ -63,6 +66,8 @@ def prepared(file: Path) -> Preparation:
 
 
 FAULTS = {
+    "grid of cells": (GOOD + CELLS + "spacing_m = 1.0\n", "planning.spacing_m is given", "only points"),
+    "unknown search": (GOOD + '\n[planning]\nsearch = "one_edge"\n', "planning.search", "did you mean 'one-edge'"),
     "no TOML": (GOOD + "\n[agent", "is not valid TOML", "line"),
     "no map": (GOOD.replace('map = "rooms.json"\n', ""), "map is missing", 'map = "'),
     "no base": (GOOD.replace("[base]\nposition = [1.0, 1.0]\n", ""), "base is missing", "[base]"),
@@ -214,10 +219,24 @@ def test_a_base_in_a_smaller_part_of_a_grid_is_where_the_mission_is(write: Write
 
 def test_too_many_cells_are_said_of_the_scenario(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("agents.leader.MOST_CELLS", 3)
-    file = write(GOOD)
+    file = write(GOOD + CELLS)
     with pytest.raises(ScenarioFault, match=r"cells") as caught:
         prepared(file)
     assert str(caught.value).startswith(f"{file}: map: ")
+
+
+def test_a_grid_too_fine_is_said_of_the_scenario(write: Write) -> None:
+    file = write(GOOD + "\n[planning]\nspacing_m = 0.01\n")
+    with pytest.raises(ScenarioFault, match=r"planning\.spacing_m: .*make it at least"):
+        prepared(file)
+
+
+def test_what_the_leader_plans_on_is_chosen_in_the_scenario(write: Write) -> None:
+    chosen = prepared(write(GOOD + '\n[planning]\nspacing_m = 1.5\nsearch = "exact"\n'))
+    mission, graph = chosen.mission, chosen.planner.graph
+    assert (mission.placements, mission.spacing_m, mission.search) == ("points", 1.5, "exact")
+    assert (graph.kind, len(graph)) == ("points", len(PlacementGraph.from_points(graph.environment, 0.2, 1.5)))
+    assert prepared(write(GOOD + CELLS)).planner.graph.kind == "cells"
 
 
 def test_robots_and_agent_may_stand_on_the_base(write: Write) -> None:
@@ -291,15 +310,17 @@ def _point(start: np.ndarray) -> object:
 
 
 def test_too_few_robots_for_a_goal_say_how_many_it_needs(write: Write) -> None:
-    # From (1, 1), the point (16, 5.5) is seen through the door only over one corner and then the other: two relays.
+    # From (1, 1) the point (16, 5.5) is seen through the door, but not all of its cell from all of the base's.
     text = GOOD.replace("[12, 1]", "[16, 5.5]").replace("count = 3", "count = 1")
     with pytest.raises(ScenarioFault, match=r"agent\.goals\[1\].* needs (\d) robots.*robots\.count"):
-        prepared(write(text))
+        prepared(write(text + CELLS))
+    assert prepared(write(text)).planner.relays_needed((16.0, 5.5)) == 0
 
 
 def test_fewer_robots_than_another_place_needs_is_a_warning(write: Write) -> None:
     text = (
         GOOD.replace("goals = [[6, 3], [12, 1]]", "").replace('"script"', '"wander"').replace("count = 3", "count = 1")
+        + CELLS
     )
     preparation = prepared(write(text))
     assert isinstance(preparation.mission.behaviour, Wandering)
