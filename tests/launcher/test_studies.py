@@ -209,7 +209,7 @@ def test_a_corrupt_measurement_breaks_the_thesis_filter_and_not_ours():
     assert run["tight_inside"][-1] == 1
 
 
-@pytest.mark.timeout(180)  # 12 s on an idle machine, most of it nine figures; more where others compute too
+@pytest.mark.timeout(180)  # 17 s of processor, most of it nine figures
 def test_the_study_in_short(tmp_path, monkeypatch):
     some = {law: LAWS[law] for law in ("thesis' gradient", "covariance", "5 steps ahead")}
     monkeypatch.setattr(localization, "LAWS", some)
