@@ -18,8 +18,8 @@ from launcher.studies.localization_figures import (
     draw_fusion,
     draw_laws,
     draw_snapshots,
+    is_like_the_thesis,
     snapshot_steps,
-    split_steps,
 )
 from launcher.studies.localization_summary import KEEPERS, THESIS, Runs, sum_up
 from launcher.studies.ranging_run import (
@@ -79,8 +79,7 @@ def study_localization(folder: Path, seeds: int = 20, tell: Callable[[str], None
 def _draw(folder: Path, runs: Runs, through: Sequence[Run], corrupt: Sequence[Run]) -> None:
     draw_embedding(folder)
     one, standing, two = EXPERIMENTS
-    # The thesis' run has all three kinds of set, and its filter comes back: of ours, a typical one of those that do.
-    alike = [run for run in corrupt if split_steps(run) and run["thesis_definite"][-1] > 0.5] or corrupt
+    alike = [run for run in corrupt if is_like_the_thesis(run)] or corrupt
     run = alike[_typical(alike)]
     draw_snapshots(
         run,

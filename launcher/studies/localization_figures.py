@@ -244,5 +244,10 @@ def split_steps(run: Run) -> list[int]:
     return [step for step, scene in enumerate(run.scenes[:CORRUPT_STEP]) if len(scene.feasible.regions) == 2]
 
 
+def is_like_the_thesis(run: Run) -> bool:
+    """Whether two regions came on the way, and the thesis' filter held a set again at the end, as in its fig. 12."""
+    return bool(split_steps(run)) and bool(run["thesis_definite"][-1] > 0.5)
+
+
 def _rows(steps: NDArray[np.int_], table: Sequence[Floats]) -> list[tuple[float, ...]]:
     return [(int(step), *map(float, values)) for step, values in zip(steps, np.array(table).T, strict=True)]
