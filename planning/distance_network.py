@@ -14,12 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.kernel import kernel
+from planning.shortest_paths import NO_PREDECESSOR
 from planning.tree import Floats, Ints, NoTree
 
 Nodes = NDArray[np.int32]
-
-NOWHERE = -1
-"""Predecessor of a source, and of what is not reached."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,14 +29,14 @@ class DistanceNetwork:
     distances: Floats
     """(t, N) float: from terminal i to placement v."""
     predecessors: Nodes
-    """(t, N) int32: the placement before v on that path, :data:`NOWHERE` at the terminal itself."""
+    """(t, N) int32: the placement before v on that path, or :data:`planning.shortest_paths.NO_PREDECESSOR`."""
     step: float
     """The Δ of Δ-stepping that suits these weights."""
 
     def path(self, terminal: int, placement: int) -> list[tuple[int, int]]:
         """Edges of the shortest path from the terminal of this index to a placement, the last one first."""
         edges = []
-        while (before := int(self.predecessors[terminal, placement])) != NOWHERE:
+        while (before := int(self.predecessors[terminal, placement])) != NO_PREDECESSOR:
             edges.append((before, placement))
             placement = before
         return edges
@@ -57,7 +55,7 @@ def distance_network(W: Floats, terminals: Ints) -> DistanceNetwork:
     Complexity: O(t N²) for a step near the weights of the links, at worst O(t N³).
     """
     shape = (len(terminals), len(W))
-    distances, predecessors = np.full(shape, np.inf), np.full(shape, NOWHERE, dtype=np.int32)
+    distances, predecessors = np.full(shape, np.inf), np.full(shape, NO_PREDECESSOR, dtype=np.int32)
     distances[np.arange(len(terminals)), terminals] = 0.0
     links = np.delete(W[terminals[0]], terminals[0])
     links = links[links < np.inf]

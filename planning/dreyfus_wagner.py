@@ -19,8 +19,9 @@ from __future__ import annotations
 import numpy as np
 
 from planning.approximate_steiner import takahashi_matsuyama
-from planning.distance_network import NOWHERE, DistanceNetwork, Nodes, lower
+from planning.distance_network import DistanceNetwork, Nodes, lower
 from planning.kernel import kernel
+from planning.shortest_paths import NO_PREDECESSOR
 from planning.tree import Floats, InvalidRequest, Tree, joining_tree
 
 LARGEST_TABLE = 2**26
@@ -50,10 +51,10 @@ def exact_tree(W: Floats, network: DistanceNetwork) -> Tree:
     if sets * len(W) > LARGEST_TABLE:
         raise InvalidRequest(
             f"{len(network.terminals)} terminals among {len(W)} placements are too many for an exact Steiner tree: "
-            "use method='takahashi-matsuyama'"
+            "take fewer, or an approximation by method='takahashi-matsuyama'"
         )
     costs = np.full((sets, len(W)), np.inf)
-    predecessors = np.full((sets, len(W)), NOWHERE, dtype=np.int32)
+    predecessors = np.full((sets, len(W)), NO_PREDECESSOR, dtype=np.int32)
     singles = 1 << np.arange(len(network.terminals) - 1)
     costs[singles], predecessors[singles] = network.distances[1:], network.predecessors[1:]
     between = np.ascontiguousarray(network.distances[:, network.terminals])
@@ -68,7 +69,7 @@ def _edges(costs: Floats, predecessors: Nodes, root: int) -> list[tuple[int, int
     labels = [(len(costs) - 1, root)]
     while labels:
         X, v = labels.pop()
-        if (before := int(predecessors[X, v])) != NOWHERE:
+        if (before := int(predecessors[X, v])) != NO_PREDECESSOR:
             edges.append((before, v))
             labels.append((X, before))
         elif X & (X - 1):

@@ -57,8 +57,11 @@ def fixed_size_tree(W: Floats, terminals: Ints, vertices: int, standing: Bools) 
     if tree is None:
         links = np.where(np.isfinite(W), 1.0, np.inf)
         fewest = len(exact_tree(links, distance_network(links, distinct)).nodes) + len(coinciding)
+        joined = f"the terminals in placements {terminals.tolist()}"
+        if vertices < fewest:
+            raise NoTree(f"{vertices} nodes do not join {joined}: it takes {fewest}")
         raise NoTree(
-            f"{vertices} nodes do not join the terminals in placements {terminals.tolist()}: it takes {fewest}"
+            f"{fewest} nodes join {joined}, and robots can stand nowhere in sight, so there cannot be {vertices}"
         )
     return tree
 

@@ -55,7 +55,7 @@ def checked_weights(W: ArrayLike) -> Floats:
     """W as a C-contiguous (N, N) float array.
 
     Args:
-        W: (N, N), symmetric, not negative; inf where there is no link. The diagonal is not looked at.
+        W: (N, N), symmetric, not negative; inf where there is no link. The diagonal is not used.
 
     Raises:
         InvalidWeights: it is not.

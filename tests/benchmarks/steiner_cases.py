@@ -23,6 +23,7 @@ from planning.mutual_visibility import mutual_visibility
 from planning.shortest_paths import all_pairs
 from planning.steiner import steiner_tree
 from planning.tree import NoTree
+from tests.planning.tree_checker import least_cost_as_printed
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -50,7 +51,7 @@ def cases() -> Iterator[Case]:
                 return steiner_tree(W, terminals)
 
             def printed(terminals: Ints, distances: Floats = distances) -> object:
-                return _dreyfus_wagner(distances, terminals)
+                return least_cost_as_printed(distances, terminals)
 
             def spanning(terminals: Ints, W: Floats = W) -> object:
                 return steiner_tree(W, terminals, "mst")
@@ -68,7 +69,7 @@ def cases() -> Iterator[Case]:
     # Squared lengths, as of the power that a radio needs: the more robots, the cheaper, so that their number counts.
     lengths = np.hypot(*(room3.centroids[:, None] - room3.centroids).transpose(2, 0, 1))
     squared = np.where(np.isfinite(whole), lengths**2, np.inf)
-    for terminals, robots, target_s in ((2, 6, 10e-3), (5, 6, 20e-3)):
+    for terminals, robots, target_s in ((2, 6, 15e-3), (5, 6, 30e-3)):
         asked = [rng.permutation(len(whole))[:terminals] for _ in range(QUESTIONS)]
 
         def counted(terminals: Ints, robots: int = robots) -> object:
@@ -91,14 +92,3 @@ def _mean(answer: Callable[[Ints], object], asked: Sequence[Ints]) -> Callable[[
         return (time.perf_counter() - begin) / len(asked)
 
     return run
-
-
-def _dreyfus_wagner(distances: Floats, terminals: Ints) -> float:
-    """The cost by algorithm 1 of the thesis, all placements at once; no tree."""
-    last = len(terminals) - 1
-    s = {1 << i: distances[terminals[i]] for i in range(last)}
-    for X in range(1, 1 << last):
-        if X not in s:
-            split = np.min([s[Y] + s[X ^ Y] for Y in range(1, X) if Y & X == Y], axis=0)
-            s[X] = (distances + split).min(axis=1)
-    return float(s[(1 << last) - 1][terminals[last]])

@@ -26,7 +26,7 @@ def cells() -> Floats:
     return np.where(mutual_visibility(decomposed).toarray(), lengths**2, np.inf)
 
 
-@settings(max_examples=120)
+@settings(max_examples=80)
 @given(seed=st.integers(0, 2**32 - 1), number=st.integers(1, 5), terminals=st.integers(1, 4), robots=st.integers(0, 4))
 def test_no_placement_of_the_robots_is_cheaper(seed: int, number: int, terminals: int, robots: int) -> None:
     random = np.random.default_rng(seed)
@@ -84,6 +84,11 @@ def test_too_few_nodes_are_told_how_many_it_takes() -> None:
     assert steiner_tree(W, [0, 4, 0], vertices=6).cost == 4.0
     with pytest.raises(NoTree, match="placement 4 cannot be reached"):
         steiner_tree(W, [0, 4], vertices=9, placements=np.array([True, True, False, True, True]))
+
+
+def test_robots_that_can_stand_nowhere_make_no_larger_tree() -> None:
+    with pytest.raises(NoTree, match=r"2 nodes join .*, and robots can stand nowhere in sight, so there cannot be 3"):
+        steiner_tree(np.ones((2, 2)), [0, 1], vertices=3, placements=np.zeros(2, dtype=bool))
 
 
 def test_robots_that_can_only_stand_aside_hang_from_the_tree() -> None:

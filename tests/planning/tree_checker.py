@@ -85,6 +85,17 @@ def least_cost(W: Floats, terminals: Sequence[int], standing: Bools | None = Non
     )
 
 
+def least_cost_as_printed(distances: Floats, terminals: Sequence[int]) -> float:
+    """Cost of the Steiner tree by algorithm 1 of the thesis, all placements at once; distances are of all pairs."""
+    last = len(terminals) - 1
+    s = {1 << i: distances[terminals[i]] for i in range(last)}
+    for X in range(1, 1 << last):
+        if X not in s:
+            split = np.min([s[Y] + s[X ^ Y] for Y in range(1, X) if Y & X == Y], axis=0)
+            s[X] = (distances + split).min(axis=1)
+    return float(s[(1 << last) - 1][terminals[last]])
+
+
 def least_cost_of_size(W: Floats, terminals: Sequence[int], robots: int, standing: Bools) -> float:
     """Cost of the fixed-size Steiner tree, over all placements of the robots."""
     chosen = combinations_with_replacement(np.flatnonzero(standing).tolist(), robots)
