@@ -10,7 +10,7 @@ import typer
 # The launcher forks, which is sound with one thread only; numpy's would be idle anyway.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from launcher.commands import live, offline, plans, study
+from launcher.commands import live, map_facts, offline, plans, study
 
 app = typer.Typer(
     name="sightline",
@@ -28,7 +28,7 @@ app.command()(live.run)
 app.command(context_settings=_PLACES)(live.goal)
 app.command()(offline.simulate)
 app.command()(plans.plan)
-app.command(name="map")(plans.show)
+app.command(name="map")(map_facts.show)
 app.command()(offline.review)
 app.add_typer(study.app, name="study")
 

@@ -35,6 +35,8 @@ _SIGHT = "#e07b00"
 _BASE = "#1f4e8c"
 _RELAY = "#16856b"
 _AGENT = "#b3262e"
+_MOVE = "#5b4b8a"
+_IDLE = "#7a828c"
 
 
 class BadPicture(ValueError):
@@ -66,18 +68,22 @@ def draw_plan(
     links: Sequence[tuple[Point, Point]],
     file: Path,
     title: str,
+    *,
+    robots: Sequence[tuple[Point, Point | None]] = (),
 ) -> None:
-    """Draw a deployment: who stands where, and the lines of sight that join them.
+    """Draw a deployment: who stands where, the lines of sight that join them, and how robots get there.
 
     Args:
         environment: metres.
         polygons: cells, each (m, 2) float, metres; None draws none.
         base: where the base station stands.
         agents: where each tracked agent is.
-        relays: where each relay is to stand, numbered from 1 in this order.
+        relays: where each relay is to stand, numbered from 1 in this order; of ``robots`` the targets in their order.
         links: the two ends of each line of sight of the chain or tree.
         file: written as PNG, PDF or SVG, by its suffix.
         title: one line above the picture.
+        robots: where each robot is and where it is to go as a relay, or None if it idles; numbered from 1 in this
+            order, and the relays by their robots. None given: nothing is said of how relays get there.
 
     Raises:
         BadPicture: the file has another suffix or cannot be written.
@@ -87,11 +93,22 @@ def draw_plan(
     figure, axes = _draw_floor(environment, polygons, file, title)
     axes.add_collection(LineCollection(list(links), colors=_SIGHT, linewidths=2, zorder=4))
     axes.plot([], [], color=_SIGHT, linewidth=2, label="line of sight")
+    ways = {str(number): way for number, way in enumerate(robots, 1)}
+    for start, end in ((start, end) for start, end in ways.values() if end is not None):
+        axes.annotate(
+            "", end, start, zorder=4.5,
+            arrowprops={"arrowstyle": "-|>", "color": _MOVE, "linewidth": 1.2, "linestyle": "--", "shrinkB": 6},
+        )  # fmt: skip
+    if relays and robots:
+        axes.plot([], [], color=_MOVE, linewidth=1.2, linestyle="--", label="movement")
+    idle = {name: start for name, (start, end) in ways.items() if end is None}
+    _draw_peers(axes, list(idle.values()), "o", _IDLE, "idle", list(idle))
+    names = [name for name in ways if name not in idle] or [str(number) for number in range(1, len(relays) + 1)]
     _draw_peers(axes, [base], "s", _BASE, "base", ["B"])
-    _draw_peers(axes, relays, "o", _RELAY, "relay", [str(number) for number in range(1, len(relays) + 1)])
+    _draw_peers(axes, relays, "o", _RELAY, "relay", names)
     _draw_peers(axes, agents, "D", _AGENT, "agent", ["A"] * len(agents))
     axes.legend(
-        loc="upper center", bbox_to_anchor=(0.5, -0.5 / figure.get_figheight()), ncols=4, frameon=False, fontsize=8
+        loc="upper center", bbox_to_anchor=(0.5, -0.5 / figure.get_figheight()), ncols=6, frameon=False, fontsize=8
     )
     _write(figure, file)
 

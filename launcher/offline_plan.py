@@ -1,0 +1,212 @@
+"""Plans without a team: trees of lines of sight to any number of agents, and who goes where for them.
+
+Terminals are the base station and the agents, which stand anywhere. They are further nodes of the placement graph: with
+N placements, terminal i is node N + i.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.deployment import identify_robots
+from planning.placement_graph import PlacementGraph
+from planning.redeployment import redeploy
+from planning.relays import fewest_relays, join_terminals
+from planning.steiner import Method, steiner_tree
+from planning.tree import NoTree, Tree
+
+if TYPE_CHECKING:
+    from protocol.messages import Point
+
+Floats = NDArray[np.float64]
+
+Search: TypeAlias = Literal["tree", "exact", "one-edge", "fixed", "chain"]
+"""``tree``: the cheapest tree first, and then which robot goes to which of its places (thesis §3.4); else
+:func:`planning.redeployment.redeploy`."""
+
+
+class NoPlan(ValueError):
+    """There is no such plan; the text says what is in the way."""
+
+
+@dataclass(frozen=True)
+class TreePlan:
+    """A tree of lines of sight.
+
+    Attributes:
+        relays: where relays stand, those nearer to the base station along the tree first.
+        links: the two ends of each line of sight, that nearer to the base station first.
+        cost: virtual, without unit.
+    """
+
+    relays: tuple[Point, ...]
+    links: tuple[tuple[Point, Point], ...]
+    cost: float
+
+
+@dataclass(frozen=True)
+class MovePlan:
+    """Who goes where.
+
+    Attributes:
+        targets: for each robot where it is to go; None for one that idles.
+        links: the two ends of each line of sight.
+        movement: what going there costs, in metres or seconds.
+        virtual: what the links cost, without unit.
+        cost: ``movement`` + μ ``virtual``.
+        lower_bound: no plan of this kind costs less; None where nothing is promised.
+    """
+
+    targets: tuple[Point | None, ...]
+    links: tuple[tuple[Point, Point], ...]
+    movement: float
+    virtual: float
+    cost: float
+    lower_bound: float | None
+
+
+class Terminals:
+    """A placement graph with a base station and agents on it.
+
+    Args:
+        graph: the placements.
+        places: (t, 2) metres: the base station, then the agents.
+    """
+
+    def __init__(self, graph: PlacementGraph, places: Sequence[Point]) -> None:
+        self._graph = graph
+        self._places: list[Point] = [(float(x), float(y)) for x, y in places]
+        self.links: Floats = np.array([graph.link_weights(place) for place in places])
+        direct = np.array([graph.direct_weights(place, places) for place in places])
+        self.direct: Floats = np.minimum(direct, direct.T)
+        self.weights: Floats = join_terminals(graph.weights, self.links, self.direct)
+        """(N + t, N + t) float: of all links."""
+        self.nodes = len(graph) + np.arange(len(places))
+        self._standing = np.arange(len(self.weights)) < len(graph)
+
+    def unreachable(self) -> list[int]:
+        """Which agents, counted from 0, no chain of relays joins to the base station."""
+        reached = self._graph.relays_from(self._places[0]) >= 0
+        joined = np.isfinite(self.direct[0]) | (np.isfinite(self.links) & reached).any(axis=1)
+        return [int(agent) for agent in np.flatnonzero(~joined[1:])]
+
+    def fewest_relays(self) -> int:
+        """How many robots it takes at least."""
+        seen, direct = np.isfinite(self.links), np.isfinite(self.direct)
+        np.fill_diagonal(direct, True)
+        return len(fewest_relays(self._graph.visible, seen, direct).relays)
+
+    def tree(self, method: Method = "exact", vertices: int | None = None, robots: int | None = None) -> TreePlan:
+        """A tree of little cost that joins all terminals.
+
+        Args:
+            method: how it is found.
+            vertices: exactly so many nodes, terminals included.
+            robots: at most so many of the nodes are robots.
+
+        Raises:
+            NoPlan: there is none with so few nodes.
+        """
+        try:
+            tree = steiner_tree(self.weights, self.nodes, method, vertices, self._standing)
+            if vertices is None and robots is not None and len(tree.nodes) - len(self.nodes) > robots:
+                tree = steiner_tree(self.weights, self.nodes, "exact", len(self.nodes) + robots, self._standing)
+        except NoTree as problem:
+            raise NoPlan(f"no tree joins the base station and all agents: {problem}") from problem
+        return self._ordered(tree)
+
+    def place_of(self, node: int) -> Point:
+        """Where a node is."""
+        if node >= len(self._graph):
+            return self._places[node - len(self._graph)]
+        x, y = self._graph.positions[node]
+        return float(x), float(y)
+
+    def _ordered(self, tree: Tree) -> TreePlan:
+        """From the base station outwards, breadth first; nodes that share a placement are one in the links."""
+        neighbours: dict[int, list[int]] = {}
+        for u, v in tree.edges.tolist():
+            if u != v:
+                neighbours.setdefault(u, []).append(v)
+                neighbours.setdefault(v, []).append(u)
+        order = [int(self.nodes[0])]
+        links = []
+        for node in order:
+            for other in neighbours.get(node, []):
+                if other not in order:
+                    order.append(other)
+                    links.append((self.place_of(node), self.place_of(other)))
+        counts = np.bincount(tree.nodes, minlength=len(self.weights))
+        relays = [self.place_of(node) for node in order if node < len(self._graph) for _ in range(counts[node])]
+        return TreePlan(tuple(relays), tuple(links), tree.cost)
+
+    def assign(self, movement: Floats, mu: float, method: Method) -> MovePlan:
+        """The cheapest tree, and for each of its places one of the robots (thesis §3.4, eq. 38).
+
+        Args:
+            movement: (k, N) float: what it costs each robot to go to each placement.
+            mu: what virtual costs count beside that.
+            method: how the tree is found.
+
+        Raises:
+            TooFewRobots: the tree needs more robots, or they cannot get there.
+        """
+        tree = steiner_tree(self.weights, self.nodes, method, None, self._standing)
+        relays = tree.nodes[tree.nodes < len(self._graph)]
+        chosen = identify_robots(movement[:, relays])
+        targets: list[Point | None] = [None] * len(movement)
+        for robot, node in zip(chosen, relays, strict=True):
+            targets[robot] = self.place_of(int(node))
+        moved = float(movement[chosen, relays].sum())
+        return MovePlan(tuple(targets), self._ordered(tree).links, moved, tree.cost, moved + mu * tree.cost, None)
+
+    def redeploy(
+        self, movement: Floats, mu: float, search: Literal["exact", "one-edge", "fixed", "chain"], idle: bool
+    ) -> MovePlan:
+        """Who goes where at the least cost of moving and of links together.
+
+        The present topology, from which ``fixed`` and ``one-edge`` start, is a line: the base station, the robots in
+        their order, the first agent; further agents hang on the last robot.
+
+        Args:
+            movement: as for :meth:`assign`.
+            mu: likewise.
+            search: see :mod:`planning.redeployment`.
+            idle: robots may be left out.
+
+        Raises:
+            NoPlan: there is none.
+            InvalidRedeployment: a chain to several agents.
+        """
+        t, k = len(self.nodes), len(movement)
+        move = np.full((t + k, len(self.weights)), np.inf)
+        move[np.arange(t), self.nodes] = 0.0
+        move[t:, : len(self._graph)] = movement
+        line = [0, *range(t, t + k), 1]
+        tree = [*pairwise(line), *((line[-2], agent) for agent in range(2, t))]
+        found = redeploy(move, self.weights, mu, search, tree, tuple(range(t)), idle)
+        if found.tree is None:
+            remedy = "say --search exact" if search in ("one-edge", "fixed") else "give more of them, or more time"
+            raise NoPlan(
+                f"from where the {k} robots are, a '{search}' search joins not all agents to the base: {remedy}"
+            )
+        places = [None if cell < 0 else self.place_of(int(cell)) for cell in found.cells]
+        links = [(places[u], places[v]) for u, v in found.tree.tolist()]
+        robots = np.flatnonzero(found.cells[t:] >= 0)
+        moved = float(movement[robots, found.cells[t:][robots]].sum())
+        ends = found.cells[found.tree]
+        virtual = float(self.weights[ends[:, 0], ends[:, 1]].sum())
+        return MovePlan(
+            tuple(places[t:]),
+            tuple((here, there) for here, there in links if here is not None and there is not None),
+            moved,
+            virtual,
+            found.cost,
+            found.lower_bound,
+        )

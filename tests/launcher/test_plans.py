@@ -1,0 +1,247 @@
+"""``sightline map`` and ``sightline plan``: what they answer, and what they refuse."""
+
+from __future__ import annotations
+
+import json
+import math
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import networkx as nx
+import numpy as np
+import pytest
+import shapely
+from typer.testing import CliRunner, Result
+
+import maps
+from launcher.cli import app
+from planning.environment import Environment
+
+ROOM3 = ["plan", "room3", "--base", "10,36", "--agent", "70,10"]
+TWO = [*ROOM3, "--agent", "30,45"]
+STARTS = [(12.0, 36.0), (31.0, 33.0), (35.0, 15.0), (60.0, 6.0)]
+ROBOTS = [word for x, y in STARTS for word in ("--robot", f"{x},{y}")]
+
+
+def sightline(*arguments: str) -> Result:
+    return CliRunner().invoke(app, list(arguments))
+
+
+def answer(*arguments: str) -> dict[str, Any]:
+    result = sightline(*arguments, "--json")
+    assert result.exit_code == 0, (result.output, result.exception)
+    facts: dict[str, Any] = json.loads(result.stdout)
+    return facts
+
+
+def check_tree(plan: dict[str, Any]) -> None:
+    """The links join base, agents and relays without a cycle, and shapely sees none that leaves the free space."""
+    links = nx.Graph([(tuple(here), tuple(there)) for here, there in plan["links"] if here != there])
+    links.add_node(tuple(plan["base"]))
+    assert nx.is_tree(links)
+    assert set(links) == {tuple(place) for place in [plan["base"], *plan["agents"], *plan["relays"]]}
+    floor = Environment.load(plan["map"]).polygon.buffer(1e-6)
+    assert all(shapely.covers(floor, shapely.LineString(link)) for link in links.edges)
+
+
+@pytest.mark.parametrize("method", ["exact", "mst", "takahashi-matsuyama"])
+@pytest.mark.parametrize("placements", ["points", "cells"])
+def test_trees_join_several_agents(method: str, placements: str) -> None:
+    plan = answer(*TWO, "--method", method, "--placements", placements)
+    check_tree(plan)
+    assert plan["relays_needed"] <= len(plan["relays"])
+    least = answer(*TWO, "--placements", placements)["cost"]
+    assert least - 1e-9 <= plan["cost"] <= 2.0 * least
+
+
+def test_points_need_fewer_robots_than_cells() -> None:
+    points, cells = (answer(*ROOM3, "--placements", placements) for placements in ("points", "cells"))
+    for plan in (points, cells):
+        check_tree(plan)
+    assert points["relays_needed"] < cells["relays_needed"]
+    assert points["decomposition"] is None
+    assert cells["decomposition"] == "inflection"
+
+
+@pytest.mark.parametrize("vertices", [5, 6, 8])
+def test_a_tree_has_as_many_nodes_as_asked_for(vertices: int) -> None:
+    plan = answer(*ROOM3, "--vertices", str(vertices))
+    check_tree(plan)
+    assert 2 + len(plan["relays"]) == vertices
+
+
+def test_spares_are_robots_that_the_tree_leaves() -> None:
+    plan = answer(*TWO, "--robots", "9")
+    assert plan["spares"] == 9 - len(plan["relays"])
+
+
+def test_few_robots_take_the_dearer_tree_that_they_suffice_for() -> None:
+    """Without a penalty for robots the cheapest tree has many short links."""
+    options = [*ROOM3, "--placements", "cells", "--weights", "combined", "--area-weight", "0"]
+    lavish = answer(*options)
+    frugal = answer(*options, "--robots", str(lavish["relays_needed"]))
+    assert lavish["relays_needed"] == len(frugal["relays"]) < len(lavish["relays"])
+    assert frugal["cost"] > lavish["cost"]
+    for plan in (lavish, frugal):
+        check_tree(plan)
+    fewest = answer(*options, "--robot-penalty", "fewest")
+    assert len(fewest["relays"]) == lavish["relays_needed"]
+    metres = sum(math.dist(*link) for link in lavish["links"])
+    assert lavish["cost"] == pytest.approx(metres, rel=0.3)  # k_a times metres between centroids
+
+
+@pytest.mark.parametrize("search", ["exact", "one-edge", "fixed", "chain", "tree"])
+def test_robots_are_sent_with_costs_that_add_up(search: str) -> None:
+    plan = answer(*ROOM3, *ROBOTS, "--search", search, "--movement", "euclidean", "--mu", "3", "--idle")
+    check_tree(plan)
+    assert [tuple(robot["from"]) for robot in plan["robots"]] == STARTS
+    ways = [(robot["from"], robot["to"]) for robot in plan["robots"] if robot["to"] is not None]
+    assert [end for _, end in ways] == plan["relays"]
+    assert plan["movement"] == pytest.approx(sum(math.dist(*way) for way in ways))
+    assert plan["cost"] == pytest.approx(plan["movement"] + 3.0 * plan["virtual"])
+    if search == "tree":
+        assert plan["virtual"] == pytest.approx(answer(*ROOM3)["cost"])
+        assert plan["lower_bound"] is None
+    else:
+        assert plan["lower_bound"] <= plan["cost"] + 1e-9
+
+
+def test_searches_are_in_order_of_their_costs() -> None:
+    costs = [
+        answer(*ROOM3, *ROBOTS, "--mu", "9", "--search", search)["cost"] for search in ("exact", "one-edge", "fixed")
+    ]
+    assert costs == sorted(costs)
+    idle = answer(*ROOM3, *ROBOTS, "--idle")
+    chain = answer(*ROOM3, *ROBOTS, "--search", "chain")
+    assert idle["cost"] == pytest.approx(chain["cost"])
+    assert any(robot["to"] is None for robot in idle["robots"])
+
+
+def test_robots_take_the_places_that_are_nearest_together() -> None:
+    """Identification: no other assignment of the robots to the places of the tree is shorter."""
+    plan = answer(*ROOM3, *ROBOTS, "--search", "tree", "--movement", "euclidean")
+    places = plan["relays"]
+    best = min(
+        sum(math.dist(STARTS[i], place) for i, place in zip(chosen, places, strict=True))
+        for chosen in product(range(len(STARTS)), repeat=len(places))
+        if len(set(chosen)) == len(places)
+    )
+    assert plan["movement"] == pytest.approx(best)
+
+
+def test_movement_round_walls_and_through_cells_is_longer_than_straight() -> None:
+    cells = [*ROOM3, "--robot", "12,36", "--robot", "13,36", "--robot", "14,36", "--robot", "15,36", "--robot", "16,36"]
+    cells += ["--placements", "cells", "--search", "tree"]
+    straight, geodesic, adjacency = (
+        answer(*cells, "--movement", movement)["movement"] for movement in ("euclidean", "geodesic", "adjacency")
+    )
+    assert straight < geodesic < adjacency
+    smoother = answer(*cells, "--movement", "adjacency", "--jump-penalty", "5")["movement"]
+    assert smoother >= adjacency
+
+
+def test_speed_makes_seconds_of_metres_and_a_deadline_forbids() -> None:
+    metres, seconds = (
+        answer(*ROOM3, *ROBOTS, "--search", "tree", *speed) for speed in ([], ["--speed", "2", "--deadline", "60"])
+    )
+    assert (metres["unit"], seconds["unit"]) == ("m", "s")
+    assert seconds["movement"] == pytest.approx(metres["movement"] / 2)
+    refused = sightline(*ROOM3, *ROBOTS, "--search", "chain", "--speed", "2", "--deadline", "0.1")
+    assert refused.exit_code == 2
+    assert "join" in refused.stderr
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--search", "chain"], "give --robot X,Y"),
+        (["--idle"], "give --robot X,Y"),
+        (["--mu", "nan"], "--mu nan is out of range"),
+        (["--vertices", "7", "--robots", "5"], "leave out --robots"),
+        (["--vertices", "7", "--method", "mst"], "leave out --method"),
+        (["--vertices", "3"], "of --vertices 3 only 1 can be robots; give at least 5"),
+        ([*ROBOTS, "--robots", "5"], "leave out --robots"),
+        ([*ROBOTS, "--deadline", "5"], "give --speed"),
+        ([*ROBOTS, "--jump-penalty", "5"], "say --movement adjacency"),
+        ([*ROBOTS, "--movement", "adjacency"], "say --placements cells"),
+        ([*ROBOTS, "--agent", "30,45", "--search", "chain"], "joins one agent, and there are 2"),
+        (["--robot", "12,36"], "--robot was given 1 time; give at least 3"),
+        (["--robot", "0,0"], "--robot [0, 0] is inside a wall"),
+        (["--robot", "north"], "--robot: 'north' is no place"),
+        (["--spacing", "1", "--placements", "cells"], "--spacing is of points"),
+        (["--spacing", "0.01"], "spacing"),
+        (["--weights", "combined"], "say --placements cells"),
+        (["--placements", "cells", "--area-weight", "2"], "normalised weights have no coefficients"),
+        (["--placements", "cells", "--robot-penalty", "many"], "give a number, 'pairwise' or 'fewest'"),
+        (["--placements", "cells", "--max-bitangent", "5"], "say --decomposition aspect"),
+        (["--agent", "0,0"], "--agent [0, 0] is inside a wall"),
+        (["--agent", "30,45", *ROBOTS, "--search", "fixed"], "say --search exact"),
+    ],
+)
+def test_what_cannot_be_planned_is_refused_in_a_sentence(options: list[str], words: str) -> None:
+    result = sightline(*ROOM3, *options)
+    assert result.exit_code == 2, (result.output, result.exception)
+    assert result.stderr.startswith("sightline: ")
+    assert result.stderr.count("\n") == 1
+    assert words in result.stderr
+
+
+def test_a_map_of_too_many_cells_is_refused_before_they_are_made() -> None:
+    options = ["plan", "cityblocks", "--base", "0,0", "--agent", "16,16", "--placements", "cells"]
+    result = sightline(*options, "--decomposition", "aspect")
+    assert result.exit_code == 2
+    assert "aspect cells would be more than the 20,000" in result.stderr
+
+
+def test_a_map_says_what_it_asks_for_and_what_it_costs() -> None:
+    facts = answer("map", "room3")
+    assert facts["robots"]["cells"] == {"placements": 98, "most_relays": 7, "parts": 1}
+    assert facts["robots"]["points"]["most_relays"] == 4
+    assert facts["forecast"]["cells"] == pytest.approx(facts["cells"], rel=0.2)
+    text = sightline("map", "room3").stdout
+    assert "any two of 98 cells need at most 7 relays" in text
+    assert "need at most 4 relays; other places at most 2 more" in text
+
+
+def test_what_takes_too_long_is_said_and_not_done() -> None:
+    facts = answer("map", "cityblocks", "--decomposition", "aspect")
+    assert facts["cells"] == 43675
+    assert facts["robots"]["cells"] == {"left_out": "more than 20,000 cells"}
+    hasty = answer("map", "office", "--decomposition", "aspect", "--patience", "0")
+    assert hasty["counts"] is None
+    assert hasty["forecast"]["cells"] == pytest.approx(2225, rel=0.1)
+    assert "--patience 0" in hasty["robots"]["cells"]["left_out"]
+
+
+def test_a_map_without_room_for_a_robot_is_described_all_the_same() -> None:
+    facts = answer("map", "room1", "--radius", "50")
+    assert facts["cells"] == 26
+    assert "left_out" in facts["robots"]["cells"]
+
+
+def test_short_bitangents_make_fewer_cells() -> None:
+    all_, short = (
+        answer("map", "room3", "--decomposition", "aspect", *options)["cells"]
+        for options in ([], ["--max-bitangent", "4"])
+    )
+    assert short < all_
+
+
+def test_maps_are_read_as_well_known_text(tmp_path: Path) -> None:
+    file = tmp_path / "hall.wkt"
+    file.write_text(shapely.to_wkt(Environment.load(maps.path("room1")).polygon, rounding_precision=-1))
+    assert answer("map", str(file))["cells"] == 26
+    plan = answer("plan", str(file), "--base", "5,10", "--agent", "55,15")
+    check_tree(plan)
+
+
+def test_pictures_show_movement_and_idle_robots(tmp_path: Path) -> None:
+    pictures = [tmp_path / "still.svg", tmp_path / "moving.svg"]
+    for picture, robots in zip(pictures, ([], [*ROBOTS, "--idle"]), strict=True):
+        assert sightline(*ROOM3, *robots, "--picture", str(picture)).exit_code == 0
+    still, moving = (picture.read_text() for picture in pictures)
+    assert "<!-- movement -->" in moving
+    assert "<!-- idle -->" in moving
+    assert "<!-- idle -->" not in still
+    assert np.array_equal([text.count("<!-- line of sight -->") for text in (still, moving)], [1, 1])
