@@ -51,6 +51,7 @@ __all__ = [
     "identify_sequence",
     "mutual_visibility",
     "physical_cost",
+    "redeploy",
     "steiner_tree",
     "virtual_weights",
 ]

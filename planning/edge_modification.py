@@ -111,7 +111,7 @@ class _Messages:
             if side is None or n != side.parents[i]:
                 if self._ends[n, i]:
                     total += self._messages[n, i]
-            elif i != side.cut[0] and self._ends[n, i] > self._ends[side.cut[::-1]]:  # not all of them are cut off
+            elif i != side.cut[0] and self._ends[n, i] > self._ends[side.cut[::-1]]:  # some are not cut off
                 total += side.arriving[i]
         return total
 
@@ -119,9 +119,7 @@ class _Messages:
         """Both sides of each edge that has ends on either side."""
         cuts = [(_Side((i, j)), _Side((j, i))) for i, j in self._edges if self._ends[i, j] and self._ends[j, i]]
         sides = [side for pair in cuts for side in pair]
-        steps = [
-            (side, i, n) for side in sides for i in side.nodes for n in self._neighbours[i] if n != side.parents[i]
-        ]
+        steps = [(side, side.cut[0], n) for side in sides for n in self._neighbours[side.cut[0]] if n != side.cut[1]]
         while steps:
             products = min_plus(self._links, np.stack([self.rooted(i, n, side) for side, i, n in steps]))
             for (side, i, n), product in zip(steps, products, strict=True):

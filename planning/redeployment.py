@@ -194,8 +194,8 @@ def _checked_costs(move: ArrayLike) -> Floats:
 
 
 def _checked_ends(ends: ArrayLike, number: int, search: Search) -> list[int]:
-    given = np.asarray(ends)
-    if given.ndim != 1 or given.dtype.kind not in "iu" or len(given) == 0:
+    given = _whole_numbers(ends)
+    if given is None or given.ndim != 1 or len(given) == 0:
         raise InvalidRedeployment(f"ends are the nodes that stay, at least one; they are {ends!r}")
     outside = given[(given < 0) | (given >= number)]
     if len(outside):
@@ -209,15 +209,14 @@ def _checked_ends(ends: ArrayLike, number: int, search: Search) -> list[int]:
 
 def _checked_tree(tree: ArrayLike, number: int, staying: list[int]) -> Ints:
     """The tree as (k − 1, 2) int; nodes that are missing and need not stay are leaves at the first that stays."""
-    given = np.asarray(tree)
-    if given.size == 0:
-        given = np.empty((0, 2), dtype=np.int64)
-    if given.ndim != 2 or given.shape[1] != 2 or given.dtype.kind not in "iu":
+    edges = _whole_numbers(tree)
+    if edges is not None and edges.size == 0:
+        edges = edges.reshape(0, 2)
+    if edges is None or edges.ndim != 2 or edges.shape[1] != 2:
         raise InvalidRedeployment("tree is a list of pairs of nodes, which are whole numbers")
-    outside = given[(given < 0) | (given >= number)]
+    outside = edges[(edges < 0) | (edges >= number)]
     if len(outside):
         raise InvalidRedeployment(f"tree names node {outside[0]}, but nodes are 0 to {number - 1}")
-    edges = given.astype(np.int64)
     missing = sorted({*range(number)} - {*staying} - {*edges.ravel().tolist()})
     edges = np.concatenate((edges, np.array([(staying[0], i) for i in missing], dtype=np.int64).reshape(-1, 2)))
     neighbours = neighbours_of(edges, number)
@@ -234,3 +233,12 @@ def _checked_tree(tree: ArrayLike, number: int, staying: list[int]) -> Ints:
             f"tree has {len(edges)} edges between {number} nodes and so a cycle: a tree has {number - 1}"
         )
     return edges
+
+
+def _whole_numbers(given: ArrayLike) -> Ints | None:
+    """An array of what is given; None if that is anything but whole numbers in rows of one length."""
+    try:
+        array = np.asarray(given)
+    except ValueError:
+        return None
+    return array.astype(np.int64) if array.dtype.kind in "iu" or array.size == 0 else None

@@ -23,6 +23,7 @@ negative, no leaf of an optimum is a node that is not needed, so only branches w
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -111,7 +112,7 @@ class SubsetProgramme:
 
 def states_of(numbers: list[int]) -> int:
     """How many states a programme with these numbers of nodes per kind has; 1 for none."""
-    return int(np.prod([number + 1 for number in numbers], dtype=np.float64))
+    return math.prod(number + 1 for number in numbers)
 
 
 def solve_subsets(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
 
@@ -34,18 +35,14 @@ def cases() -> Iterator[Case]:
         move, W = instance(k, 570)
         line = [(0, 2), *((i, i + 1) for i in range(2, k - 1)), (k - 1, 1)]
         if k == 8:
-            yield (
-                f"fixed topology, line of k = {k}, 570 cells",
-                0.005,
-                lambda move=move, W=W, line=line: redeploy(move, W, MU, "fixed", line),
-            )
+            yield f"fixed topology, line of k = {k}, 570 cells", 0.005, partial(redeploy, move, W, MU, "fixed", line)
         yield (
             f"one-edge, line of k = {k}, 570 cells",
             target_s,
-            lambda move=move, W=W, line=line: redeploy(move, W, MU, "one-edge", line),
+            partial(redeploy, move, W, MU, "one-edge", line),
             "algorithm 7 in numpy",
-            lambda move=move, W=W, line=line: naive_one_edge(move, W, MU, line),
+            partial(naive_one_edge, move, W, MU, line),
         )
     for k, target_s in ((6, 0.020), (8, 0.080), (10, 0.400)):
         move, W = instance(k, 638)
-        yield f"exact, k = {k}, 638 cells", target_s, lambda move=move, W=W: redeploy(move, W, MU)
+        yield f"exact, k = {k}, 638 cells", target_s, partial(redeploy, move, W, MU)

@@ -164,7 +164,7 @@ def tree_programme(move: Floats, links: Floats, edges: Pairs) -> float:
     """Thesis algorithm 5, corrected, from node 0; (N, N) links are scaled by μ."""
 
     def rooted(node: int, ancestor: int) -> Floats:
-        cost = move[node].copy()
+        cost: Floats = move[node].copy()
         for i, j in edges:
             if node in (i, j) and ancestor not in (i, j):
                 child = j if i == node else i
