@@ -357,9 +357,9 @@ def _layout(mission: Mission, bounds: tuple[float, float, float, float] | None) 
     curves = [
         rrb.TimeSeriesView(origin=f"/{entity}", name=name, plot_legend=rrb.PlotLegend(visible=False))
         for entity, name in (
-            ("lambda2", "λ2 of the team"),
-            ("planning_ms", "Planning time [ms]"),
-            ("cost", "Cost of the decision (amber) and its lower bound (green) [m]"),
+            ("lambda2", "λ2"),
+            ("planning_ms", "Planning [ms]"),
+            ("cost", "Cost, bound [m]"),
         )
     ]
     return rrb.Blueprint(

@@ -44,10 +44,13 @@ for name, kind in (("room1", "aspect"), ("room2", "aspect"), ("office", "inflect
     weights = virtual_weights(cells, mutual_visibility(cells))
     all_pairs(weights); from_source(weights, 0)
     base, agent = (tuple(map(float, places[i])) for i in (0, -1))
-    planner = DeploymentPlanner(environment, base, 0.2, kind)
-    robots = {f"robot_{i}": tuple(map(float, places[2 + i])) for i in range(8)}
-    plan = planner.plan(agent, (agent,), robots, None)
-    planner.plan(agent, (agent,), robots, plan)
+    robots = {f"robot_{i}": tuple(map(float, places[2 + i])) for i in range(5)}
+    for placements in ("cells", "points"):
+        for search in ("chain", "exact", "one-edge", "fixed"):
+            planner = DeploymentPlanner(environment, base, 0.2, kind, placements=placements, search=search)
+            plan = planner.plan(agent, (agent,), robots, None)
+            planner.plan(agent, (agent,), robots, plan)
+            planner.most_relays_needed()
 """
 
 
