@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,10 +25,6 @@ if TYPE_CHECKING:
     from protocol.messages import Point
 
 Floats = NDArray[np.float64]
-
-Search: TypeAlias = Literal["tree", "exact", "one-edge", "fixed", "chain"]
-"""``tree``: the cheapest tree first, and then which robot goes to which of its places (thesis §3.4); else
-:func:`planning.redeployment.redeploy`."""
 
 
 class NoPlan(ValueError):

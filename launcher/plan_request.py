@@ -19,8 +19,10 @@ if TYPE_CHECKING:
     from planning.placement_graph import PlacementGraph
     from protocol.messages import Point
 
+# As planning has them; importing them from there takes a second, before a word is said.
 Method: TypeAlias = Literal["exact", "mst", "takahashi-matsuyama"]
 Search: TypeAlias = Literal["tree", "exact", "one-edge", "fixed", "chain"]
+"""``tree``: the cheapest tree first, and then which robot goes to which of its places (thesis §3.4)."""
 Movement: TypeAlias = Literal["geodesic", "euclidean", "adjacency"]
 
 

@@ -175,8 +175,8 @@ def _answer(request: Request, picture: Path | None, as_json: bool) -> None:
     with busy("Planning ..."):
         graph, cells = place(file, ground.environment, options, request.base, say)
         terminals = Terminals(graph, [request.base, *request.agents])
-        for lost in terminals.unreachable():
-            x, y = request.agents[lost]
+        if lost := terminals.unreachable():
+            x, y = request.agents[lost[0]]
             raise ScenarioFault(
                 f"{file}: no chain of robots joins --agent {x:g},{y:g} to --base; move it, make --radius smaller, or "
                 "choose other placements"

@@ -80,7 +80,7 @@ def test_cells_and_graphs_of_random_maps_move_with_them(seed: int, scale: float,
     """Far from the origin as long as coordinates resolve a thousand-millionth of the map there.
 
     And as long as they resolve the directions of walls: 100 km away coordinates are rounded by 1e-11 m, which turns a
-    wall of half a millimetre so far that its ray misses by 3e-7 m a wall in line with it 10 m on (`environment_of(67)`).
+    wall of half a millimetre so far that its ray misses a wall in line with it, 10 m on, by 3e-7 m: see map 67.
     """
     environment = environment_of(seed)
     lengths = np.linalg.norm(environment.walls[:, 1] - environment.walls[:, 0], axis=1)
