@@ -15,17 +15,20 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from planning.kernel import kernel
 from planning.tree import Floats, Ints
 
+Places = NDArray[np.uint32]
+
 STRIDE: Final = 4
 """Links taken at once; rows are filled up to a multiple of it with links that do not exist."""
 
-LANES: Final = 64
+LANES: Final = 32
 """Products computed at once: more would no longer fit into the cache."""
 
-FEW: Final = 3
+FEW: Final = 6
 """Fewer products than this are faster one by one."""
 
 
@@ -35,8 +38,8 @@ class Links:
 
     starts: Ints
     """(N + 1,) int: where the links of each placement begin."""
-    neighbours: Ints
-    """(m,) int: the other end of each link."""
+    neighbours: Places
+    """(m,) uint32: the other end of each link; without a sign, so that no kernel has to look for negative indices."""
     weights: Floats
     """(m,) float: μ W; inf where the row is only filled up."""
 
@@ -45,7 +48,7 @@ class Links:
         """N, how many placements there are."""
         return len(self.starts) - 1
 
-    def of(self, v: int) -> tuple[Ints, Floats]:
+    def of(self, v: int) -> tuple[Places, Floats]:
         """The other ends of the links of a placement, and their weights; the placement itself at weight 0 included."""
         span = slice(self.starts[v], self.starts[v + 1])
         return self.neighbours[span], self.weights[span]
@@ -88,7 +91,7 @@ def min_plus(links: Links, costs: Floats) -> Floats:
 
 
 @kernel
-def _compress(W: Floats, mu: float) -> tuple[Ints, Ints, Floats]:
+def _compress(W: Floats, mu: float) -> tuple[Ints, Places, Floats]:
     number = len(W)
     starts = np.zeros(number + 1, dtype=np.int64)
     for v in range(number):
@@ -96,7 +99,7 @@ def _compress(W: Floats, mu: float) -> tuple[Ints, Ints, Floats]:
         for u in range(number):
             finite += (W[v, u] < np.inf) & (u != v)
         starts[v + 1] = starts[v] + (finite + STRIDE - 1) // STRIDE * STRIDE
-    neighbours = np.empty(starts[number], dtype=np.int64)
+    neighbours = np.empty(starts[number], dtype=np.uint32)
     weights = np.empty(starts[number])
     for v in range(number):
         place = starts[v]
@@ -111,34 +114,37 @@ def _compress(W: Floats, mu: float) -> tuple[Ints, Ints, Floats]:
 
 
 @kernel
-def _one_by_one(starts: Ints, neighbours: Ints, weights: Floats, costs: Floats, products: Floats) -> None:
+def _one_by_one(starts: Ints, neighbours: Places, weights: Floats, costs: Floats, products: Floats) -> None:
     """Four minima at a time, so that none has to wait for the one before."""
     for n in range(len(costs)):
         cost = costs[n]
         for v in range(len(starts) - 1):
+            to, weight = neighbours[starts[v] : starts[v + 1]], weights[starts[v] : starts[v + 1]]
             a, b, c, d = np.inf, np.inf, np.inf, np.inf
-            for e in range(starts[v], starts[v + 1], STRIDE):
-                x = cost[neighbours[e]] + weights[e]
+            for stride in range(len(to) // STRIDE):
+                e = stride * STRIDE
+                x = cost[to[e]] + weight[e]
                 a = x if x < a else a
-                x = cost[neighbours[e + 1]] + weights[e + 1]
+                x = cost[to[e + 1]] + weight[e + 1]
                 b = x if x < b else b
-                x = cost[neighbours[e + 2]] + weights[e + 2]
+                x = cost[to[e + 2]] + weight[e + 2]
                 c = x if x < c else c
-                x = cost[neighbours[e + 3]] + weights[e + 3]
+                x = cost[to[e + 3]] + weight[e + 3]
                 d = x if x < d else d
             products[n, v] = min(min(a, b), min(c, d))
 
 
 @kernel
-def _side_by_side(starts: Ints, neighbours: Ints, weights: Floats, costs: Floats, products: Floats) -> None:
-    """The same for costs and products (N, n), so that one weight serves n neighbours in memory."""
+def _side_by_side(starts: Ints, neighbours: Places, weights: Floats, costs: Floats, products: Floats) -> None:
+    """The same for costs and products (N, n), so that each weight is read once for n of them."""
     for v in range(len(starts) - 1):
+        to, weight = neighbours[starts[v] : starts[v + 1]], weights[starts[v] : starts[v + 1]]
         least = products[v]
         least[:] = np.inf
-        for e in range(starts[v], starts[v + 1], STRIDE):
-            w, x, y, z = weights[e], weights[e + 1], weights[e + 2], weights[e + 3]
-            c, d = costs[neighbours[e]], costs[neighbours[e + 1]]
-            f, g = costs[neighbours[e + 2]], costs[neighbours[e + 3]]
+        for stride in range(len(to) // STRIDE):
+            e = stride * STRIDE
+            w, x, y, z = weight[e], weight[e + 1], weight[e + 2], weight[e + 3]
+            c, d, f, g = costs[to[e]], costs[to[e + 1]], costs[to[e + 2]], costs[to[e + 3]]
             for lane in range(len(least)):
                 first = c[lane] + w
                 other = d[lane] + x
