@@ -241,8 +241,9 @@ def path_between(tree: Ints) -> list[int]:
 
 
 def name_place(point: Point | Floats) -> str:
-    """A place in words."""
-    return f"({point[0]:.4g}, {point[1]:.4g}) m"
+    """A place in words, to the centimetre."""
+    x, y = (round(float(value), 2) for value in point)
+    return f"({x:.12g}, {y:.12g}) m"
 
 
 def relays_in_words(number: int) -> str:

@@ -69,14 +69,14 @@ def choose_points(environment: Environment, free: Environment, spacing_m: float)
     """
     if not 0.0 < spacing_m < math.inf:
         raise UnfitSpacing(f"the spacing of placements is {spacing_m} m: give a finite length above 0")
-    expected = free.area / (HEXAGON * spacing_m**2) + len(free.reflex_vertices)
+    corners = _thin(_middles_of_arcs(environment, free), CORNER_SHARE * spacing_m)
+    expected = free.area / (HEXAGON * spacing_m**2) + len(corners)
     if expected > MOST:
-        least_m = math.sqrt(free.area / (HEXAGON * max(MOST - len(free.reflex_vertices), LEAST_GRID)))
+        least_m = math.sqrt(free.area / (HEXAGON * max(MOST - len(corners), LEAST_GRID)))
         raise UnfitSpacing(
             f"a spacing of {spacing_m:g} m makes about {expected:.0f} placements, and at most {MOST} can be planned "
             f"on: make it at least {math.ceil(1e3 * least_m) / 1e3:g} m"
         )
-    corners = _thin(_middles_of_arcs(environment, free), CORNER_SHARE * spacing_m)
     points = _with_grid(corners, free, spacing_m)
     visible = environment.visibility_matrix(points)
     if not connected(visible):
