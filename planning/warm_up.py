@@ -9,6 +9,7 @@ def exercise() -> None:
     """Plan in two rooms with a pillar."""
     from planning.chain import cheapest_chain
     from planning.connectivity import connected
+    from planning.coordination import bound_collisions, collision_boxes
     from planning.decomposition import decompose
     from planning.edge_weights import virtual_weights
     from planning.environment import Environment
@@ -39,6 +40,8 @@ def exercise() -> None:
     geodesics.path(points[0], points[1])
     geodesics.lengths(points[0], points[1:])
     geodesics.nearest((-1.0, -1.0))
+    collision_boxes(points[:2], points[2:], 0.4)
+    bound_collisions(points[None, :2], points[None, 2:], 0.4)
     graph = PlacementGraph.from_points(rooms, 0.2, 2.0)
     graph.distances_from(points[0])
     _ = graph.distances
