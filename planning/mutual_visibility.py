@@ -1,15 +1,13 @@
 """The mutual visibility graph: which pairs of cells see each other with all their points.
 
-Two convex cells P and Q are mutually visible iff the hull of P ∪ Q lies in free space (thesis §3.2.1). The hull's
-border is a part of P's, a part of Q's, and two *bridges*, the outer common tangents. So the hull is free iff no wall
-crosses a bridge and no hole lies between the bridges (§4.1.1, steps 2–5). Three observations make that cheap:
+Two convex cells P and Q are mutually visible iff the hull of P ∪ Q lies in free space (thesis §3.2.1, and §4.1.1,
+steps 2–5); see `planning.hull_obstacles`. Two observations make that cheap:
 
-- A segment from p to q that enters an obstacle crosses a wall with p strictly in front and q strictly behind. So only
-  walls matter that have a corner of P in front and a corner of Q behind; if there is none, the cells see each other.
-- A hole between the bridges has such a wall, and that wall has an end between the bridges. So the same walls tell of
-  the bridges and of the holes.
 - The wall that hides a cell mostly hides its neighbours too. It is tried first, on the segment of the centroids.
-- Every aspect cell lies in one inflection cell, and inherits what that one sees.
+- Every aspect cell lies in one inflection cell, its *parent*, and inherits what enters the hull of its parent and the
+  other's: nothing, and they see each other; a wall that parts the parents, and they do not; or a few walls and their
+  ends. Then the hull of the cells themselves is free iff none of those walls crosses the segment of the centroids and
+  none of those ends lies inside it: a wall that enters a hull and does not end there goes through, between the cells.
 
 Cells touch walls, and bridges of cells run along walls and through vertices: grazing is seeing. So every cell is first
 shrunk about its centroid by the factor 1 − `SHRINKAGE`; then a bridge meets a wall only if it crosses it. An obstacle
@@ -24,6 +22,15 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import depth_first_order
 
 from planning.decomposition import Cells, decompose, measure_cells
+from planning.hull_obstacles import (
+    NO_WALL,
+    CornerIndices,
+    crosses,
+    find_entering,
+    find_tangents,
+    is_inside_hull,
+    sort_walls,
+)
 from planning.kernel import kernel
 
 Floats = NDArray[np.float64]
@@ -32,6 +39,9 @@ Bools = NDArray[np.bool_]
 
 SHRINKAGE = 1e-6
 """Smaller is less forgiving towards rounding: 1e-9 loses edges between slivers."""
+
+PARENT_SHRINKAGE = 1e-9
+"""Smaller than that of the cells, so that what enters the hull of two cells is found in that of their parents."""
 
 MOST_CELLS = 20_000
 """Above this the graph alone takes hundreds of megabytes, and what is computed from it gigabytes."""
@@ -50,166 +60,147 @@ def mutual_visibility(cells: Cells) -> csr_array:
     Raises:
         TooManyCells: more than `MOST_CELLS`.
 
-    Complexity: O(N² V) for N cells and V walls, of which a hidden pair mostly costs O(1).
+    Complexity: O(M² V + N²) for N aspect cells in M parents, as few of the V walls enter the hull of two parents;
+    O(N² V) for inflection cells, where a hidden pair mostly costs O(1). N² bytes besides the graph.
     """
-    environment, frame = cells.environment, cells.frame
     n = len(cells)
     if n > MOST_CELLS:
         raise TooManyCells(
-            f"{environment.name or 'the map'} has {n} {cells.kind} cells, more than the {MOST_CELLS} that a mutual "
-            f"visibility graph is made for: use inflection cells, shorter bitangents or a simpler map"
+            f"{cells.environment.name or 'the map'} has {n} {cells.kind} cells, more than the {MOST_CELLS} that a "
+            f"mutual visibility graph is made for: use inflection cells, shorter bitangents or a simpler map"
         )
+    divided = cells.kind == "aspect"
+    parents = decompose(cells.environment, "inflection") if divided else cells
+    parent = parents.locate(cells.centroids) if divided else np.arange(n)
+    members = np.argsort(parent, kind="stable")
+    seen = _find_visible(
+        *_shrink(parents, PARENT_SHRINKAGE if divided else SHRINKAGE),
+        # Neighbours after each other: depth first along adjacency.
+        depth_first_order(parents.adjacency, 0, directed=False, return_predecessors=False).astype(np.int64),
+        *_shrink(cells, SHRINKAGE),
+        members,
+        np.searchsorted(parent[members], np.arange(len(parents) + 1)),
+        cells.frame.enter(cells.environment.walls.reshape(-1, 2)).reshape(-1, 4),
+        cells.environment.successors.copy(),  # kernels are compiled for arrays that can be written to
+        divided,
+    )
+    columns, starts = _list_true(seen)
+    return csr_array((np.ones(len(columns), np.bool_), columns, starts), shape=(n, n))
+
+
+def _shrink(cells: Cells, share: float) -> tuple[Floats, Ints, Floats]:
+    """The cells shrunk about their centroids: corners (C, 2), starts (N + 1,), centroids (N, 2), unit frame."""
     centroids = measure_cells(cells.unit_corners, cells.starts)[1]
     centre = np.repeat(centroids, np.diff(cells.starts), axis=0)
-    shrunk = centre + (1.0 - SHRINKAGE) * (cells.unit_corners - centre)
-    walls = frame.enter(environment.walls.reshape(-1, 2)).reshape(-1, 4)
-    # Neighbours after each other: depth first along adjacency.
-    order = depth_first_order(cells.adjacency, 0, directed=False, return_predecessors=False).astype(np.int64)
-    parent, inherited = _find_parents(cells)
-    seen = _find_visible(shrunk, cells.starts, centroids, order, walls, parent, inherited)
-    flat = np.flatnonzero(seen)
-    starts = np.concatenate([[0], np.cumsum(np.count_nonzero(seen, axis=1))])
-    return csr_array((np.ones(len(flat), np.bool_), flat % n, starts), shape=(n, n))
-
-
-def _find_parents(cells: Cells) -> tuple[Ints, Bools]:
-    """For each cell the inflection cell around it, and which of those see each other; without them, nothing."""
-    if cells.kind == "inflection":
-        return np.zeros(len(cells), np.int64), np.zeros((1, 1), np.bool_)
-    parents = decompose(cells.environment, "inflection")
-    return parents.locate(cells.centroids), mutual_visibility(parents).toarray()
-
-
-@kernel
-def _sort_walls(corners: Floats, starts: Ints, walls: Floats) -> tuple[Bools, Bools]:
-    """Which cells have a corner strictly in front of which walls, and strictly behind: (N, V) bool each. O(C V)."""
-    n = len(starts) - 1
-    front, behind = np.zeros((n, len(walls)), np.bool_), np.zeros((n, len(walls)), np.bool_)
-    for w in range(len(walls)):
-        ax, ay = walls[w, 0], walls[w, 1]
-        dx, dy = walls[w, 2] - ax, walls[w, 3] - ay
-        for i in range(n):
-            for k in range(starts[i], starts[i + 1]):
-                side = dx * (corners[k, 1] - ay) - dy * (corners[k, 0] - ax)
-                front[i, w] = front[i, w] or side > 0.0
-                behind[i, w] = behind[i, w] or side < 0.0
-    return front, behind
-
-
-@kernel
-def _side(px: float, py: float, qx: float, qy: float, x: float, y: float) -> float:
-    """Positive when (x, y) is left of the line from p to q, negative when right."""
-    return (qx - px) * (y - py) - (qy - py) * (x - px)
-
-
-@kernel
-def _crosses(walls: Floats, w: int, px: float, py: float, qx: float, qy: float) -> bool:
-    """Whether the segment from p to q goes through wall w from its front."""
-    ax, ay, bx, by = walls[w, 0], walls[w, 1], walls[w, 2], walls[w, 3]
-    if _side(ax, ay, bx, by, qx, qy) >= 0.0 or _side(ax, ay, bx, by, px, py) <= 0.0:
-        return False
-    return bool((_side(px, py, qx, qy, ax, ay) > 0.0) != (_side(px, py, qx, qy, bx, by) > 0.0))
-
-
-@kernel
-def _find_bridge(corners: Floats, p: int, p_end: int, q: int, q_end: int, side: float) -> tuple[int, int]:
-    """Corners of two disjoint convex polygons whose line has no corner of either on the given side.
-
-    ``side`` is 1 for the left of the line from the first polygon to the second, -1 for the right. From one end of the
-    line to the tangent through the other, in turn; every turn moves the line towards that side. O(corners) a turn,
-    two or three turns.
-    """
-    p_first, q_first = p, q
-    for _ in range(p_end - p + q_end - q):
-        moved = False
-        x, y = corners[q, 0], corners[q, 1]
-        for k in range(p_first, p_end):
-            if side * _side(corners[p, 0], corners[p, 1], x, y, corners[k, 0], corners[k, 1]) > 0.0:
-                p = k
-                moved = True
-        x, y = corners[p, 0], corners[p, 1]
-        for k in range(q_first, q_end):
-            if side * _side(x, y, corners[q, 0], corners[q, 1], corners[k, 0], corners[k, 1]) > 0.0:
-                q = k
-                moved = True
-        if not moved:
-            break
-    return p, q
-
-
-@kernel
-def _find_obstacle(
-    corners: Floats, p: int, p_end: int, q: int, q_end: int, walls: Floats, candidates: Ints, count: int
-) -> int:
-    """The first of the ``count`` candidate walls that enters the hull of two shrunk cells, or -1."""
-    a, b = _find_bridge(corners, p, p_end, q, q_end, 1.0)
-    c, d = _find_bridge(corners, p, p_end, q, q_end, -1.0)
-    ax, ay, bx, by = corners[a, 0], corners[a, 1], corners[b, 0], corners[b, 1]
-    cx, cy, dx, dy = corners[c, 0], corners[c, 1], corners[d, 0], corners[d, 1]
-    for f in range(count):
-        w = candidates[f]
-        x, y = walls[w, 0], walls[w, 1]
-        start_left = _side(ax, ay, bx, by, x, y) > 0.0
-        start_right = _side(cx, cy, dx, dy, x, y) < 0.0
-        end_left = _side(ax, ay, bx, by, walls[w, 2], walls[w, 3]) > 0.0
-        end_right = _side(cx, cy, dx, dy, walls[w, 2], walls[w, 3]) < 0.0
-        if (start_left and end_left) or (start_right and end_right):
-            continue
-        if start_left != end_left and _crosses(walls, w, ax, ay, bx, by):
-            return int(w)
-        if start_right != end_right and _crosses(walls, w, cx, cy, dx, dy):
-            return int(w)
-        if (
-            not (start_left or start_right)
-            and _side(cx, cy, ax, ay, x, y) <= 0.0
-            and _side(dx, dy, bx, by, x, y) >= 0.0
-        ):
-            return int(w)
-    return -1
+    return centre + (1.0 - share) * (cells.unit_corners - centre), cells.starts, centroids
 
 
 @kernel
 def _find_visible(
-    corners: Floats, starts: Ints, centroids: Floats, order: Ints, walls: Floats, parent: Ints, inherited: Bools
+    parent_corners: Floats,
+    parent_starts: Ints,
+    parent_centroids: Floats,
+    order: Ints,
+    corners: Floats,
+    starts: Ints,
+    centroids: Floats,
+    members: Ints,
+    member_starts: Ints,
+    walls: Floats,
+    after: Ints,
+    divided: bool,
 ) -> Bools:
-    """`mutual_visibility` as a dense (N, N) array; ``order`` puts near cells after each other."""
-    n = len(order)
-    seen = np.zeros((n, n), np.bool_)
-    front, behind = _sort_walls(corners, starts, walls)
-    hides = np.zeros(n, np.int64)  # by cell: the wall that last hid it
-    facing, candidates = np.empty(len(walls), np.int64), np.empty(len(walls), np.int64)
-    for row in range(n):
+    """`mutual_visibility` as a dense (N, N) array.
+
+    Args:
+        parent_corners: of M parents, shrunk, one after the other.
+        parent_starts: (M + 1,), where each parent's corners start.
+        parent_centroids: (M, 2).
+        order: (M,), puts near parents after each other.
+        corners: (C, 2), of N cells, shrunk.
+        starts: (N + 1,), where each cell's corners start.
+        centroids: (N, 2), of the cells.
+        members: (N,), the cells, by parent.
+        member_starts: (M + 1,), where each parent's cells start.
+        walls: (V, 4).
+        after: (V,), the vertex at each wall's end.
+        divided: False if the cells are their own parents.
+    """
+    seen = np.zeros((len(starts) - 1, len(starts) - 1), np.bool_)
+    front, behind = sort_walls(parent_corners, parent_starts, walls)
+    right, left = find_tangents(corners, starts, walls if divided else walls[:0])
+    hides = np.zeros(len(order), np.int64)  # by parent: the wall that last hid it
+    entering, ends = np.empty(len(walls), np.int64), np.empty(2 * len(walls), np.int64)
+    for row in range(len(order)):
         i = order[row]
-        seen[i, i] = True
-        px, py = centroids[i, 0], centroids[i, 1]
-        faces = 0
-        for w in range(len(walls)):
-            if front[i, w]:
-                facing[faces] = w
-                faces += 1
+        first = members[member_starts[i] : member_starts[i + 1]]
+        for p in first:
+            for q in first:
+                seen[p, q] = True
+        facing = np.flatnonzero(front[i])
         last = 0  # the wall that last hid a cell of this row
-        for column in range(row + 1, n):
+        for column in range(row + 1, len(order)):
             j = order[column]
-            qx, qy = centroids[j, 0], centroids[j, 1]
-            if _crosses(walls, last, px, py, qx, qy):
+            if not divided:
+                px, py = parent_centroids[i, 0], parent_centroids[i, 1]
+                qx, qy = parent_centroids[j, 0], parent_centroids[j, 1]
+                if crosses(walls, last, px, py, qx, qy):
+                    continue
+                if crosses(walls, hides[j], px, py, qx, qy):
+                    last = hides[j]
+                    continue
+            number, ends_number, parting = find_entering(
+                parent_corners,
+                parent_starts,
+                i,
+                j,
+                walls,
+                after,
+                facing,
+                behind,
+                len(walls) if divided else 1,
+                entering,
+                ends,
+            )
+            if parting == NO_WALL and number > 0 and not divided:
+                parting = entering[0]
+            if parting != NO_WALL:
+                last = hides[j] = parting
                 continue
-            if _crosses(walls, hides[j], px, py, qx, qy):
-                last = hides[j]
-                continue
-            if inherited[parent[i], parent[j]]:
-                seen[i, j] = seen[j, i] = True
-                continue
-            count = 0
-            for f in range(faces):
-                candidates[count] = facing[f]
-                count += behind[j, facing[f]]
-            obstacle = -1
-            if count > 0:
-                obstacle = _find_obstacle(
-                    corners, starts[i], starts[i + 1], starts[j], starts[j + 1], walls, candidates, count
-                )
-            if obstacle < 0:
-                seen[i, j] = seen[j, i] = True
-            else:
-                last = hides[j] = obstacle
+            for k in range(member_starts[i], member_starts[i + 1]):
+                p = members[k]
+                for m in range(member_starts[j], member_starts[j + 1]):
+                    q = members[m]
+                    hidden = False
+                    for e in range(number):
+                        if crosses(
+                            walls, entering[e], centroids[p, 0], centroids[p, 1], centroids[q, 0], centroids[q, 1]
+                        ):
+                            hidden = True
+                            break
+                    for e in range(0 if hidden else ends_number):
+                        v = ends[e]
+                        if is_inside_hull(
+                            corners, walls[v, 0], walls[v, 1], right[p, v], left[p, v], right[q, v], left[q, v]
+                        ):
+                            hidden = True
+                            break
+                    if not hidden:
+                        seen[p, q] = seen[q, p] = True
     return seen
+
+
+@kernel
+def _list_true(seen: Bools) -> tuple[CornerIndices, CornerIndices]:
+    """Columns of the true entries, row by row, and where each row starts, (N + 1,)."""
+    starts = np.zeros(len(seen) + 1, np.int32)
+    for i in range(len(seen)):
+        starts[i + 1] = starts[i] + np.count_nonzero(seen[i])
+    columns = np.empty(starts[-1], np.int32)
+    entry = 0
+    for i in range(len(seen)):
+        for j in range(len(seen)):
+            if seen[i, j]:
+                columns[entry] = j
+                entry += 1
+    return columns, starts

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib import import_module
 from itertools import combinations
 
@@ -12,6 +13,7 @@ from scipy.sparse import csr_array
 import maps
 from planning.decomposition import Cells, Kind, decompose
 from planning.environment import Environment
+from planning.hull_obstacles import find_bridges, find_tangents, is_inside_hull
 from planning.mutual_visibility import TooManyCells, mutual_visibility
 from tests.planning.polygons import environment_of, shared_maps
 
@@ -106,12 +108,11 @@ def test_points_of_cells_that_see_each_other_see_each_other(seed: int) -> None:
     assert not blocked.any(), f"seed {seed}: {p[blocked][:1]} and {q[blocked][:1]}"
 
 
-def test_inherited_edges_are_those_found_without_inheritance(monkeypatch: pytest.MonkeyPatch) -> None:
-    cells = decompose(Environment.load(maps.path("room3")), "aspect")
-    seen = mutual_visibility(cells)
-    nothing = (np.zeros(len(cells), np.int64), np.zeros((1, 1), np.bool_))
-    monkeypatch.setattr(module, "_find_parents", lambda _: nothing)
-    assert (mutual_visibility(cells) != seen).nnz == 0
+@pytest.mark.parametrize("environment", [Environment.load(maps.path("room3")), *map(environment_of, range(8))])
+def test_inherited_edges_are_those_found_without_parents(environment: Environment) -> None:
+    cells = decompose(environment, "aspect")
+    # The same cells as their own parents: every pair is then decided by its own bridges.
+    assert (mutual_visibility(cells) != mutual_visibility(replace(cells, kind="inflection"))).nnz == 0
 
 
 @pytest.mark.parametrize("size", [1.0, 1e-2, 1e-4])
@@ -154,19 +155,39 @@ def test_too_many_cells_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
         mutual_visibility(cells)
 
 
+def _draw_hulls(rng: np.random.Generator) -> tuple[list[NDArray[np.float64]], NDArray[np.float64]]:
+    """Two disjoint convex polygons, and their corners one after the other."""
+    drawn = [rng.uniform((x, 0.0), (x + 1.0, 1.0), (6, 2)) for x in (0.0, rng.uniform(1.0, 3.0))]
+    hulls = [shapely.convex_hull(shapely.MultiPoint(points)) for points in drawn]
+    polygons = [np.array(shapely.orient_polygons(hull).exterior.coords)[:-1] for hull in hulls]
+    return polygons, np.ascontiguousarray(np.concatenate(polygons))
+
+
 def test_bridges_are_the_outer_common_tangents() -> None:
     rng = np.random.default_rng(2)
     for _ in range(500):
-        drawn = [rng.uniform((x, 0.0), (x + 1.0, 1.0), (6, 2)) for x in (0.0, rng.uniform(1.0, 3.0))]
-        hulls = [shapely.convex_hull(shapely.MultiPoint(points)) for points in drawn]
-        polygons = [np.array(shapely.orient_polygons(hull).exterior.coords)[:-1] for hull in hulls]
-        corners = np.ascontiguousarray(np.concatenate(polygons))
+        polygons, corners = _draw_hulls(rng)
         n, m = len(polygons[0]), len(corners)
-        for side in (1.0, -1.0):
-            a, b = module._find_bridge(corners, 0, n, n, m, side)
-            assert a < n <= b < m
-            span, offset = corners[b] - corners[a], corners - corners[a]
+        a, b, c, d = find_bridges(corners, 0, n, n, m)
+        for start, end, side in ((a, b, 1.0), (c, d, -1.0)):
+            assert start < n <= end < m
+            span, offset = corners[end] - corners[start], corners - corners[start]
             assert (side * (span[0] * offset[:, 1] - span[1] * offset[:, 0]) <= 1e-12).all()
+
+
+def test_points_inside_a_hull_are_told_by_their_tangents() -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(100):
+        polygons, corners = _draw_hulls(rng)
+        shapes = [shapely.Polygon(polygon) for polygon in polygons]
+        points = rng.uniform(corners.min(axis=0) - 0.2, corners.max(axis=0) + 0.2, (60, 2))
+        points = points[~shapely.contains_xy(shapely.union_all(shapes), points)]
+        starts = np.array([0, len(polygons[0]), len(corners)])
+        right, left = find_tangents(corners, starts, np.concatenate([points, points], axis=1))
+        hull = shapely.union_all(shapes).convex_hull
+        for v, (x, y) in enumerate(points):
+            ends = (right[0, v], left[0, v], right[1, v], left[1, v])
+            assert is_inside_hull(corners, x, y, *ends) == shapely.contains_xy(hull, x, y)
 
 
 def test_all_pairs_of_a_convex_room_see_each_other() -> None:
