@@ -11,12 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation import convex_polygon
-from estimation.convex_pieces import MOST_VERTICES, SCRATCH
-from estimation.convex_polygon import area, clip, depth, hull, simplify
+from estimation.convex_cut import MOST_VERTICES, SCRATCH
+from estimation.convex_polygon import area, clip, hull, simplify
 from estimation.kernel import kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+
+MOST_CROSSINGS = 16
+"""Of two boundaries that are looked at; two are the rule."""
 
 
 @kernel
@@ -28,40 +32,23 @@ def part(P: Floats, n: int, Q: Floats, m: int, other: Floats) -> tuple[int, int,
     Where two convex boundaries cross at two points, the line through these will do: what it takes from one lies in the
     other. That is checked, not trusted. A piece inside the other vanishes.
     """
-    both, spare = np.empty((2 * SCRATCH, 2)), np.empty((2 * SCRATCH, 2))
-    common = n
-    both[:n] = P[:n]
-    for i in range(m):
-        j = i + 1 if i + 1 < m else 0
-        ex, ey = Q[j, 0] - Q[i, 0], Q[j, 1] - Q[i, 1]
-        length = math.sqrt(ex * ex + ey * ey)
-        if length == 0.0:
-            continue
-        nx, ny = ey / length, -ex / length
-        common = clip(both, common, nx, ny, nx * Q[i, 0] + ny * Q[i, 1] - 2.0 * convex_polygon.ROUNDING_M, spare)
-        both[:common] = spare[:common]
-        if common == 0:
-            return n, m, True
-    near = 1e-8
-    x, y = np.empty(2 * SCRATCH), np.empty(2 * SCRATCH)
-    ends = 0
-    for i in range(common):
-        if depth(P, n, both[i, 0], both[i, 1]) < near and depth(Q, m, both[i, 0], both[i, 1]) < near:
-            x[ends], y[ends] = both[i, 0], both[i, 1]
-            ends += 1
+    if _separates(P, n, Q, m) or _separates(Q, m, P, n):
+        return n, m, True
     if _inside(Q, m, P, n):
         return n, 0, True
     if _inside(P, n, Q, m):
         return 0, m, True
-    for i in range(ends):
-        for j in range(ends):
-            ex, ey = x[j] - x[i], y[j] - y[i]
+    points = np.empty((MOST_CROSSINGS, 2))
+    found = _crossings(P, n, Q, m, points)
+    for i in range(found):
+        for j in range(found):
+            ex, ey = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1]
             length = math.sqrt(ex * ex + ey * ey)
-            if length < 10.0 * near:
+            if length < 1e-7:
                 continue
             # P keeps the left of the line from i to j, Q the right.
             nx, ny = ey / length, -ex / length
-            limit = nx * x[i] + ny * y[i]
+            limit = nx * points[i, 0] + ny * points[i, 1]
             k = clip(P, n, -nx, -ny, -limit, other)
             if not _inside(other, k, Q, m):
                 continue
@@ -77,12 +64,63 @@ def part(P: Floats, n: int, Q: Floats, m: int, other: Floats) -> tuple[int, int,
 
 
 @kernel
+def _separates(P: Floats, n: int, Q: Floats, m: int) -> bool:
+    """Whether an edge of a polygon has another polygon on its outer side, up to what clipping moves outwards."""
+    for i in range(n):
+        j = i + 1 if i + 1 < n else 0
+        ex, ey = P[j, 0] - P[i, 0], P[j, 1] - P[i, 1]
+        slack = 4.0 * convex_polygon.ROUNDING_M * math.sqrt(ex * ex + ey * ey)
+        beyond = slack > 0.0
+        for k in range(m):
+            if ex * (Q[k, 1] - P[i, 1]) - ey * (Q[k, 0] - P[i, 0]) > slack:
+                beyond = False
+                break
+        if beyond:
+            return True
+    return False
+
+
+@kernel
 def _inside(P: Floats, n: int, Q: Floats, m: int) -> bool:
     """Whether a polygon lies in another, to within rounding."""
-    for i in range(n):  # noqa: SIM110
-        if depth(Q, m, P[i, 0], P[i, 1]) < -4.0 * convex_polygon.ROUNDING_M:
-            return False
+    for i in range(m):
+        j = i + 1 if i + 1 < m else 0
+        ex, ey = Q[j, 0] - Q[i, 0], Q[j, 1] - Q[i, 1]
+        slack = -4.0 * convex_polygon.ROUNDING_M * math.sqrt(ex * ex + ey * ey)
+        for k in range(n):
+            if ex * (P[k, 1] - Q[i, 1]) - ey * (P[k, 0] - Q[i, 0]) < slack:
+                return False
     return True
+
+
+@kernel
+def _crossings(P: Floats, n: int, Q: Floats, m: int, points: Floats) -> int:
+    """Write the points where the boundary of a polygon enters or leaves another into points (k, 2); their number."""
+    found = 0
+    for i in range(n):
+        j = i + 1 if i + 1 < n else 0
+        enter, leave = 0.0, 1.0
+        for k in range(m):
+            h = k + 1 if k + 1 < m else 0
+            ex, ey = Q[h, 0] - Q[k, 0], Q[h, 1] - Q[k, 1]
+            slack = convex_polygon.ROUNDING_M * math.sqrt(ex * ex + ey * ey)
+            first = ex * (P[i, 1] - Q[k, 1]) - ey * (P[i, 0] - Q[k, 0]) + slack
+            last = ex * (P[j, 1] - Q[k, 1]) - ey * (P[j, 0] - Q[k, 0]) + slack
+            if first < 0.0 and last < 0.0:
+                leave = -1.0
+                break
+            if first < 0.0:
+                enter = max(enter, first / (first - last))
+            elif last < 0.0:
+                leave = min(leave, first / (first - last))
+        if enter > leave:
+            continue
+        for t in (enter, leave):
+            if 0.0 < t < 1.0 and found < len(points):
+                points[found, 0] = P[i, 0] + t * (P[j, 0] - P[i, 0])
+                points[found, 1] = P[i, 1] + t * (P[j, 1] - P[i, 1])
+                found += 1
+    return found
 
 
 @kernel
@@ -98,8 +136,12 @@ def grow(pieces: Floats, counts: Ints, distance: float, out: Floats, kept: Ints)
     for i in range(m):
         kept[i] = convex_polygon.grow(pieces[i], counts[i], distance, grown[i])
         _bound(grown[i], kept[i], box[i])
+    overlaps = True
     # A second round for what the hulls of the first one overlap.
     for _ in range(2):
+        if not overlaps:
+            break
+        overlaps = False
         for i in range(m):
             for j in range(i):
                 if kept[i] == 0 or kept[j] == 0:
@@ -113,7 +155,7 @@ def grow(pieces: Floats, counts: Ints, distance: float, out: Floats, kept: Ints)
                 # An overlap costs area over and over again, a hull once.
                 if area(joint, n) <= 1.1 * max(area(grown[i], kept[i]), area(grown[j], kept[j])):
                     grown[j, :n] = joint[:n]
-                    kept[i], kept[j] = 0, n
+                    kept[i], kept[j], overlaps = 0, n, True
                     _bound(joint, n, box[j])
     k = 0
     for i in range(m):

@@ -1,11 +1,13 @@
-"""Kernels on a union of convex polygons: cut by an annulus, keep the number of pieces bounded, and measure.
+"""Kernels on a union of convex polygons: keep it near the annuli it stands for, with few pieces, and measure it.
 
-Pieces are (m, MOST_VERTICES, 2) float with the numbers of their vertices (m,) int; see `estimation.convex_polygon`.
-They hardly overlap; `estimation.convex_growth`, which makes them overlap, also parts them.
+A set is pieces (m, MOST_VERTICES, 2) float, the numbers of their vertices (m,) int (see `estimation.convex_polygon`)
+and, of every piece, the width at which it was *checked* last (m,) float: all remembered annuli were cut out of it as
+finely as that width asked for. The width of a piece is 2 · area / perimeter. A cut that stays t away from a circle
+costs no more area than t times the perimeter, so tolerances in proportion to the width bound the share of area that is
+too much, be a piece round or a sliver; and when a piece has become thinner, what was fine enough no longer is, and the
+annuli are cut out of it again.
 
-An annulus is not convex. Its outer disc is left by tangents. For the inner one the piece is split by rays from the
-anchor into wedges, and each wedge loses what lies before the chord between its rays: that much is inside the disc for
-sure, and what is left of the disc is thinner than the tolerance.
+Pieces hardly overlap; `estimation.convex_growth`, which makes them overlap, also parts them.
 """
 
 from __future__ import annotations
@@ -16,184 +18,191 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation import convex_polygon
-from estimation.convex_polygon import area, clip, depth, distances, hull, simplify
+from estimation.convex_cut import MOST_VERTICES, SCRATCH, cut_piece
+from estimation.convex_polygon import area, depth, distances, hull, simplify
 from estimation.kernel import kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-MOST_VERTICES = 16
-"""Of one piece."""
-
-MOST_PIECES = 128
+MOST_PIECES = 512
 """Of one set."""
 
-SCRATCH = 4 * MOST_VERTICES
-"""Rows enough for a piece while it is worked on."""
+FINENESS = 0.025
+"""How far a cut may stay from its circle, as a share of the piece's width."""
 
-MOST_TANGENTS = 12
-"""On one piece."""
+RING_FINENESS = 0.04
+"""The same for the ring of a first range, as a share of its width."""
+
+SWEEPS = 8
+"""Over all pieces, at most."""
+
+THINNER = 0.7
+"""A piece is checked again when its width has fallen to this share."""
+
+COARSE = -1.0
+"""In place of a width: places ran out, so the piece is to be checked again when there are more."""
+
+FINEST_M = 1e-9
+"""Tolerance below which rounding decides."""
 
 
 @kernel
-def _crossings(P: Floats, n: int, ax: float, ay: float, r: float, facing: float, span: Floats) -> bool:
-    """Widen span (2,) by the angles, from a direction, at which the boundary crosses a circle; whether it does."""
-    found = False
+def width(P: Floats, n: int) -> float:
+    """2 · area / perimeter of a piece, metres."""
+    around = 0.0
     for i in range(n):
         j = i + 1 if i + 1 < n else 0
-        px, py = P[i, 0] - ax, P[i, 1] - ay
-        ex, ey = P[j, 0] - P[i, 0], P[j, 1] - P[i, 1]
-        a = ex * ex + ey * ey
-        half = px * ex + py * ey
-        c = px * px + py * py - r * r
-        square = half * half - a * c
-        if a == 0.0 or square <= 0.0:
-            continue
-        # Roots of at² + 2·half·t + c in the form that does not cancel.
-        q = -(half + math.copysign(math.sqrt(square), half))
-        for t in (q / a, c / q if q != 0.0 else -1.0):
-            if 0.0 <= t <= 1.0:
-                found = True
-                _widen(span, px + t * ex, py + t * ey, facing)
-    return found
-
-
-@kernel
-def _widen(span: Floats, x: float, y: float, facing: float) -> None:
-    """Make a span of angles relative to a direction hold that of (x, y)."""
-    angle = (math.atan2(y, x) - facing + math.pi) % (2.0 * math.pi) - math.pi
-    span[0], span[1] = min(span[0], angle), max(span[1], angle)
-
-
-@kernel
-def _leave_disc(P: Floats, n: int, ax: float, ay: float, r: float, tolerance: float, other: Floats) -> int:
-    """Cut a piece by tangents of the disc that it partly leaves, in place; other is scratch."""
-    _, farthest, inside = distances(P, n, ax, ay)
-    if farthest <= r:
-        return n
-    span = np.array([np.inf, -np.inf])
-    mx, my = 0.0, 0.0
-    for i in range(n):
-        mx += (P[i, 0] - ax) / n
-        my += (P[i, 1] - ay) / n
-    facing = math.atan2(my, mx)
-    crosses = _crossings(P, n, ax, ay, r, facing, span)
-    if inside or not crosses:
-        span[0], span[1] = -math.pi, math.pi
-    step = 2.0 * math.acos(1.0 / (1.0 + tolerance / r)) if r > 0.0 else math.pi
-    tangents = min(MOST_TANGENTS, max(1, math.ceil((span[1] - span[0]) / step)))
-    if inside or not crosses:
-        tangents = MOST_TANGENTS
-    for i in range(tangents):
-        angle = facing + span[0] + (i + 0.5) * (span[1] - span[0]) / tangents
-        nx, ny = math.cos(angle), math.sin(angle)
-        n = clip(P, n, nx, ny, nx * ax + ny * ay + r, other)
-        P[:n] = other[:n]
-        if n == 0:
-            break
-    return n
+        around += math.sqrt((P[j, 0] - P[i, 0]) ** 2 + (P[j, 1] - P[i, 1]) ** 2)
+    return 2.0 * area(P, n) / around if around > 0.0 else 0.0
 
 
 @kernel
 def cut(
-    pieces: Floats, counts: Ints, ax: float, ay: float, r0: float, r1: float, tolerance: float, out: Floats, kept: Ints
-) -> tuple[int, bool]:
-    """Write an outer bound of what an annulus leaves of a set into out (MOST_PIECES, …) and kept (MOST_PIECES,).
+    pieces: Floats, counts: Ints, checked: Floats, annuli: Floats, out: Floats, kept: Ints, passed: Floats
+) -> tuple[int, bool, bool]:
+    """Write an outer bound of what the last of some annuli leaves of a set into out, kept and passed.
+
+    All pieces are cut by the last annulus first; then those that came out thin by all annuli, until none is thin.
 
     Args:
         pieces: the set.
-        counts: its vertices.
-        ax: anchor, metres, frame of the set.
-        ay: the same.
-        r0: inner radius, metres.
-        r1: outer radius, metres; may be inf.
-        tolerance: how far the straight cuts may stay from the circles, metres; more where pieces run out.
-        out: receives the pieces.
+        counts: see the module.
+        checked: see the module; inf where not at all.
+        annuli: (k, 4) float: x, y, inner and outer radius, metres, frame of the set. The set lies in all but the last,
+            up to tolerances.
+        out: (MOST_PIECES, MOST_VERTICES, 2), receives the pieces.
         kept: receives their numbers of vertices.
+        passed: receives the widths at which they were checked.
 
     Returns:
-        The number of pieces, and whether anything was cut.
+        The number of pieces, whether anything was cut, and whether the last annulus says anything about the set.
     """
-    m, changed = 0, False
-    P, Q, other = np.empty((SCRATCH, 2)), np.empty((SCRATCH, 2)), np.empty((SCRATCH, 2))
-    for piece in range(len(counts)):
-        n = counts[piece]
-        nearest, farthest, inside = distances(pieces[piece], n, ax, ay)
-        if nearest > r1 or farthest < r0:
-            changed = True
-            continue
-        if nearest >= r0 and farthest <= r1:
-            out[m, :n] = pieces[piece, :n]
-            kept[m] = n
-            m += 1
-            continue
-        changed = True
-        P[:n] = pieces[piece, :n]
-        # Every piece that follows must have a place.
-        room = MOST_PIECES - m - (len(counts) - piece - 1)
-        wedges, first, step, facing = 1, 0.0, 0.0, 0.0
-        if nearest < r0:
-            widest = 2.0 * math.acos(max(0.0, 1.0 - tolerance / r0))
-            if inside:
-                wedges = max(3, math.ceil(2.0 * math.pi / widest))
-                wedges = min(wedges, room) if room >= 3 else 0
-                step = 2.0 * math.pi / max(wedges, 1)
-            else:
-                span = np.array([np.inf, -np.inf])
-                mx, my = 0.0, 0.0
-                for i in range(n):
-                    mx += (P[i, 0] - ax) / n
-                    my += (P[i, 1] - ay) / n
-                facing = math.atan2(my, mx)
-                _crossings(P, n, ax, ay, r0, facing, span)
-                for i in range(n):
-                    if (P[i, 0] - ax) ** 2 + (P[i, 1] - ay) ** 2 < r0 * r0:
-                        _widen(span, P[i, 0] - ax, P[i, 1] - ay, facing)
-                # A disc that just touches may come out with no crossing: then it cuts nothing off.
-                wedges = min(max(1, math.ceil((span[1] - span[0]) / widest)), room) if span[1] > span[0] else 0
-                first = facing + span[0]
-                step = (span[1] - span[0]) / max(wedges, 1)
-        for wedge in range(max(wedges, 1)):
-            k = n
-            Q[:k] = P[:k]
-            if nearest < r0 and wedges > 0:
-                low, high = first + wedge * step, first + (wedge + 1) * step
-                if inside or wedge > 0:
-                    nx, ny = math.sin(low), -math.cos(low)
-                    k = clip(Q, k, nx, ny, nx * ax + ny * ay, other)
-                    Q[:k] = other[:k]
-                if k and (inside or wedge < wedges - 1):
-                    nx, ny = -math.sin(high), math.cos(high)
-                    k = clip(Q, k, nx, ny, nx * ax + ny * ay, other)
-                    Q[:k] = other[:k]
-                if k:
-                    nx, ny = -math.cos(0.5 * (low + high)), -math.sin(0.5 * (low + high))
-                    k = clip(Q, k, nx, ny, nx * ax + ny * ay - r0 * math.cos(0.5 * step), other)
-                    Q[:k] = other[:k]
-            if k:
-                k = _leave_disc(Q, k, ax, ay, r1, tolerance, other)
-            if k:
-                k = simplify(Q, k, MOST_VERTICES)
-            if k:
-                out[m, :k] = Q[:k]
-                kept[m] = k
+    scratch, P = np.empty((2, SCRATCH, 2)), np.empty((SCRATCH, 2))
+    last = len(annuli) - 1
+    # Pieces still to be cut wait at the end of out: at the annulus `stage`, with tolerances for the width `basis`.
+    stage, basis = np.empty(MOST_PIECES, dtype=np.int64), np.empty(MOST_PIECES)
+    m, top, changed, telling = 0, MOST_PIECES - len(counts), False, False
+    coarse, before = False, np.inf
+    for i in range(len(counts)):
+        out[top + i, : counts[i]] = pieces[i, : counts[i]]
+        kept[top + i], passed[top + i] = counts[i], checked[i]
+        stage[top + i], basis[top + i] = last, width(pieces[i], counts[i])
+    for sweep in range(SWEEPS):
+        if sweep:
+            # Once; and again while places ran out, but may not run out any more because so much is gone.
+            size = total_area(out, kept[:m])
+            if m == 0 or not (changed if sweep == 1 else coarse and size < 0.5 * before):
+                break
+            before = size
+            for i in range(m - 1, -1, -1):
+                top -= 1
+                _move(out, kept, i, top)
+                passed[top], stage[top] = passed[i], last + 1
+            m, coarse = 0, False
+        while top < MOST_PIECES:
+            n, at, wide, after = kept[top], stage[top], basis[top], passed[top]
+            P[:n] = out[top, :n]
+            top += 1
+            while n > 0:
+                if at > last:
+                    now = width(P, n) if sweep else np.inf
+                    if now <= FINEST_M or now >= THINNER * after:
+                        break
+                    at, wide, after = 0, now, now
+                ax, ay, r0, r1 = annuli[at]
+                nearest, farthest, inside = distances(P, n, ax, ay)
+                telling = telling or (at == last and (nearest < r0 or farthest > r1))
+                if nearest > r1 or farthest < r0:
+                    n, changed = 0, True
+                    break
+                tolerance = max(FINENESS * min(wide, r1 - r0), FINEST_M)
+                inner, outer = r0 - nearest > tolerance, farthest - r1 > 2.0 * tolerance
+                at += 1
+                if not (inner or outer):
+                    continue
+                changed = True
+                # Places are shared with the pieces that wait.
+                most = max(1, (top - m) // (1 + MOST_PIECES - top))
+                first = top - most
+                k, enough = cut_piece(
+                    P, n, ax, ay, r0, r1, tolerance, inner, inside, most, out[first:top], kept[first:top], scratch
+                )
+                n = kept[first] if k else 0
+                P[:n] = out[first, :n]
+                after = after if enough else COARSE
+                for i in range(first + k - 1, first, -1):
+                    top -= 1
+                    _move(out, kept, i, top)
+                    stage[top], basis[top], passed[top] = at, wide, after
+            if n:
+                out[m, :n] = P[:n]
+                coarse = coarse or after == COARSE
+                kept[m], passed[m] = n, np.inf if after == COARSE else after
                 m += 1
-    return m, changed
+    return m, changed, telling
 
 
 @kernel
-def ring(ax: float, ay: float, r0: float, r1: float, tolerance: float, out: Floats, kept: Ints) -> int:
-    """Write a ring of pieces around an annulus into out and kept; their number."""
-    square = np.empty((1, MOST_VERTICES, 2))
-    for i in range(4):
-        square[0, i, 0] = ax + (2.0 * r1 if i in (0, 3) else -2.0 * r1)
-        square[0, i, 1] = ay + (2.0 * r1 if i < 2 else -2.0 * r1)
-    m, _ = cut(square, np.array([4]), ax, ay, r0, r1, tolerance, out, kept)
-    return m
+def check(pieces: Floats, counts: Ints, m: int, passed: Floats) -> None:
+    """Take the first m pieces as checked at their widths."""
+    for i in range(m):
+        passed[i] = width(pieces[i], counts[i])
 
 
 @kernel
-def merge(pieces: Floats, counts: Ints, m: int, share: float, most: int) -> int:
+def _move(out: Floats, kept: Ints, source: int, target: int) -> None:
+    """Copy a piece from one place to another."""
+    n = kept[source]
+    out[target, :n] = out[source, :n]
+    kept[target] = n
+
+
+@kernel
+def telling(pieces: Floats, counts: Ints, annuli: Floats) -> NDArray[np.bool_]:
+    """Which annuli (k,) do not contain the whole set."""
+    tells = np.zeros(len(annuli), dtype=np.bool_)
+    for j in range(len(annuli)):
+        for i in range(len(counts)):
+            nearest, farthest, _ = distances(pieces[i], counts[i], annuli[j, 0], annuli[j, 1])
+            if nearest < annuli[j, 2] or farthest > annuli[j, 3]:
+                tells[j] = True
+                break
+    return tells
+
+
+@kernel
+def ring(ax: float, ay: float, r0: float, r1: float, out: Floats, kept: Ints, passed: Floats) -> int:
+    """Write a ring of pieces around an annulus into out, kept and passed; their number."""
+    if r0 <= 0.0:
+        count, step = 1, 2.0 * math.pi / MOST_VERTICES
+        kept[0] = MOST_VERTICES
+        for i in range(MOST_VERTICES):
+            _polar(out[0, i], ax, ay, r1 / math.cos(0.5 * step), i * step)
+    else:
+        tolerance = RING_FINENESS * (r1 - r0)
+        widest = 2.0 * math.acos(max(0.5, 1.0 - tolerance / r0, 1.0 / (1.0 + tolerance / r1)))
+        count = min(MOST_PIECES // 4, math.ceil(2.0 * math.pi / widest))
+        step = 2.0 * math.pi / count
+        reach = r1 / math.cos(0.5 * step)
+        for i in range(count):
+            _polar(out[i, 0], ax, ay, r0, (i + 1) * step)
+            _polar(out[i, 1], ax, ay, r0, i * step)
+            _polar(out[i, 2], ax, ay, reach, i * step)
+            _polar(out[i, 3], ax, ay, reach, (i + 1) * step)
+            kept[i] = 4
+    passed[:count] = np.inf
+    return count
+
+
+@kernel
+def _polar(point: Floats, ax: float, ay: float, r: float, angle: float) -> None:
+    """Fill a point (2,): at a distance and angle from an anchor."""
+    point[0], point[1] = ax + r * math.cos(angle), ay + r * math.sin(angle)
+
+
+@kernel
+def merge(pieces: Floats, counts: Ints, checked: Floats, m: int, share: float, most: int) -> int:
     """Merge neighbours in the list whose hull adds less than a share of their area, in place; the number of pieces.
 
     While there are more than most, the share is doubled. Pieces of one annulus are listed around it, so neighbours in
@@ -210,12 +219,12 @@ def merge(pieces: Floats, counts: Ints, m: int, share: float, most: int) -> int:
                 n = simplify(joint, n, MOST_VERTICES)
             if fits and area(joint, n) <= limit:
                 pieces[i, :n] = joint[:n]
-                counts[i] = n
+                counts[i], checked[i] = n, max(checked[i], checked[j])
                 continue
             i += 1
             if i != j:
                 pieces[i, : counts[j]] = pieces[j, : counts[j]]
-                counts[i] = counts[j]
+                counts[i], checked[i] = counts[j], checked[j]
         m = min(m, i + 1)
         if m <= most:
             return m

@@ -4,10 +4,17 @@ An ellipsoid is loose: after many ranges its feasible set is tens of times the i
 the intersection itself, in the plane, at about the same cost, and never loses the target either. Deployments plan with
 it. It begins with the first range; one range leaves a ring of thin wedges.
 
-What is approximated always is outwards: circles by tangents and chords no farther off than :data:`FINENESS` of the
-set's size, a move by a polygon around a disc, polygons of too many vertices by fewer, too many pieces by hulls. As the
-set shrinks, cuts that were fine enough become coarse; so the last ranges are remembered and cut again when the set has
-become half as wide. Ranges older than a move of the target are remembered with wider bounds.
+What is approximated always is outwards: circles by tangents and chords, a move by a polygon around a disc, polygons of
+too many vertices by fewer, too many pieces by hulls. How near a cut comes to its circle goes by the width of the piece
+that is cut; and as a piece becomes thinner, cuts that were fine enough become coarse, so the last ranges that still
+bound the set are remembered, and cut again (`estimation.convex_pieces`). Ranges older than a move of the target are
+remembered with wider bounds.
+
+*How tight.* A target that stands: at most 1.1 times the true area after 5 to 40 ranges, 1.01 in the median, mirror
+images, slivers and far anchors included (tests). Beyond that are rings more than some 5000 times wider than thick,
+which the bounded number of pieces cannot follow round, and sets no wider than some micrometres, where the padding of
+the ranges decides. A target that moves: 1.02 times what exact growing and cutting would leave in the median, and up to
+1.1, since every step bounds the disc of the move by a polygon and may fuse neighbours.
 """
 
 from __future__ import annotations
@@ -19,7 +26,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimation import convex_growth, convex_pieces
-from estimation.convex_pieces import MOST_PIECES, MOST_VERTICES
+from estimation.convex_cut import MOST_VERTICES
+from estimation.convex_pieces import MOST_PIECES
 from estimation.outlier_rule import Outliers, make_rule
 from estimation.range_measurement import (
     PADDING_M,
@@ -34,14 +42,14 @@ from estimation.range_measurement import (
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-FINENESS = 0.01
-"""How far a cut may stay from its circle, as a share of the set's size and of the annulus's width."""
-
 MERGE_SHARE = 0.002
 """Neighbouring pieces are merged where their hull adds no more than this share of their area."""
 
+MERGE_SHARE_MOVING = 0.006
+"""The same after a move of the target, which blurs the set anyway."""
+
 REMEMBERED = 24
-"""Ranges that are cut again when the set has shrunk."""
+"""Ranges that are cut again where the set has become thinner."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,16 +69,20 @@ class TightReport(MeasurementReport):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Union:
-    """Pieces and what is needed to cut them finer, in the frame of the tight set."""
+    """Pieces (`estimation.convex_pieces`) and what is needed to cut them finer, in the frame of the tight set."""
 
     pieces: Floats
     """(m, MOST_VERTICES, 2) float, metres."""
     counts: Ints
     """(m,) int, vertices of each."""
+    checked: Floats
+    """(m,) float, metres: width of each when all remembered annuli were cut out of it."""
+    annuli: Floats
+    """(k, 4) float: x, y, inner and outer radius of those remembered, metres, the oldest first."""
     area: float
-    remembered: tuple[Annulus, ...]
-    cut_at: float
-    """Size, the square root of the area, at which the remembered ranges were cut last."""
+
+
+_NO_ANNULI = np.empty((0, 4))
 
 
 class _Polygons:
@@ -79,68 +91,60 @@ class _Polygons:
     def __init__(self) -> None:
         self._out = np.empty((MOST_PIECES, MOST_VERTICES, 2))
         self._kept = np.empty(MOST_PIECES, dtype=np.int64)
+        self._passed = np.empty(MOST_PIECES)
 
-    def _take(self, m: int, remembered: tuple[Annulus, ...], cut_at: float) -> _Union:
+    def _take(self, m: int, annuli: Floats, share: float = MERGE_SHARE) -> _Union:
         """The first m pieces of the output, merged where that costs little."""
-        m = convex_pieces.merge(self._out, self._kept, m, MERGE_SHARE, MOST_PIECES // 2)
-        pieces, counts = self._out[:m].copy(), self._kept[:m].copy()
-        return _Union(pieces, counts, convex_pieces.total_area(pieces, counts), remembered, cut_at)
+        out, kept, passed = self._out, self._kept, self._passed
+        m = convex_pieces.merge(out, kept, passed, m, share, 3 * MOST_PIECES // 4)
+        pieces, counts = out[:m].copy(), kept[:m].copy()
+        return _Union(pieces, counts, passed[:m].copy(), annuli, convex_pieces.total_area(pieces, counts))
 
     def begin(self, annulus: Annulus) -> _Union:
-        size = math.sqrt(math.pi * (annulus.outer - annulus.inner) * (annulus.outer + annulus.inner))
-        m = convex_pieces.ring(*annulus, _tolerance(size, annulus), self._out, self._kept)
-        return self._take(m, (annulus,), size)
+        return self._take(convex_pieces.ring(*annulus, self._out, self._kept, self._passed), np.array([annulus]))
 
     def cut(self, held: _Union, annulus: Annulus) -> _Union | None:
-        rest = self._cut(held, annulus)
-        if rest is None or rest is held:
-            return rest
-        remembered = (*held.remembered[1 - REMEMBERED :], annulus)
-        size = math.sqrt(rest.area)
-        if size > 0.5 * held.cut_at:
-            return _Union(rest.pieces, rest.counts, rest.area, remembered, held.cut_at)
-        for old in remembered[:-1]:
-            again = self._cut(rest, old)
-            if again is None:
-                return None
-            rest = again
-        return _Union(rest.pieces, rest.counts, rest.area, remembered, size)
-
-    def _cut(self, held: _Union, annulus: Annulus) -> _Union | None:
-        tolerance = _tolerance(math.sqrt(held.area), annulus)
-        m, changed = convex_pieces.cut(held.pieces, held.counts, *annulus, tolerance, self._out, self._kept)
+        annuli = np.empty((len(held.annuli) + 1, 4))
+        annuli[:-1], annuli[-1] = held.annuli, annulus
+        m, changed, telling = convex_pieces.cut(
+            held.pieces, held.counts, held.checked, annuli, self._out, self._kept, self._passed
+        )
         if m == 0:
             return None
-        return self._take(m, held.remembered, held.cut_at) if changed else held
+        if not (changed or telling):
+            return held
+        if len(annuli) > REMEMBERED:
+            annuli = annuli[convex_pieces.telling(held.pieces, held.counts, annuli)][-REMEMBERED:]
+        if not changed:
+            return _Union(held.pieces, held.counts, held.checked, annuli, held.area)
+        return self._take(m, annuli)
 
     def cut_or(self, held: _Union | None, fallback: _Union, annulus: Annulus) -> _Union:
-        inside = self.begin(annulus) if held is None else self._cut(held, annulus)
+        inside = self.begin(annulus) if held is None else self.cut(held, annulus)
         parts = [] if inside is None else [inside]
         # Padded the other way: outside of the annulus means outside of what a right range can leave.
         hole, rim = annulus.inner + 2.0 * PADDING_M, annulus.outer - 2.0 * PADDING_M
         for x, y, low, high in ((annulus.x, annulus.y, 0.0, hole), (annulus.x, annulus.y, rim, math.inf)):
-            outside = self._cut(fallback, Annulus(x, y, low, high))
+            outside = self.cut(fallback, Annulus(x, y, low, high))
             if outside is not None:
                 parts.append(outside)
         pieces = np.concatenate([part.pieces for part in parts])
         counts = np.concatenate([part.counts for part in parts])
+        checked = np.full(len(counts), np.inf)
         area = sum(part.area for part in parts)
-        if len(counts) > MOST_PIECES // 2:
-            m = convex_pieces.merge(pieces, counts, len(counts), MERGE_SHARE, MOST_PIECES // 2)
-            pieces, counts = pieces[:m].copy(), counts[:m].copy()
+        if len(counts) > MOST_PIECES // 4:
+            m = convex_pieces.merge(pieces, counts, checked, len(counts), MERGE_SHARE, MOST_PIECES // 4)
+            pieces, counts, checked = pieces[:m].copy(), counts[:m].copy(), checked[:m].copy()
             area = convex_pieces.total_area(pieces, counts)
-        return _Union(pieces, counts, area, (), math.sqrt(area))
+        return _Union(pieces, counts, checked, _NO_ANNULI, area)
 
     def grow(self, held: _Union, distance_m: float) -> _Union:
         m = convex_growth.grow(held.pieces, held.counts, distance_m, self._out, self._kept)
-        remembered = tuple(
-            Annulus(x, y, max(0.0, inner - distance_m), outer + distance_m) for x, y, inner, outer in held.remembered
-        )
-        return self._take(m, remembered, held.cut_at)
-
-
-def _tolerance(size: float, annulus: Annulus) -> float:
-    return FINENESS * min(size, annulus.outer - annulus.inner) + 1e-9
+        convex_pieces.check(self._out, self._kept, m, self._passed)
+        annuli = held.annuli.copy()
+        annuli[:, 2] = np.maximum(0.0, annuli[:, 2] - distance_m)
+        annuli[:, 3] += distance_m
+        return self._take(m, annuli, MERGE_SHARE_MOVING)
 
 
 class TightSet:

@@ -31,6 +31,9 @@ def exercise() -> None:
             region.farthest_point(target)
             _ = region.area_m2, region.centroid, region.covariance
         _ = ellipsoids.feasible_set().regions
+    # More ranges than a tight set remembers, none of them redundant.
+    for turn in np.linspace(0.0, 2.0 * np.pi, 40):
+        tight.measure(target - 5.0 * np.array([np.cos(turn), np.sin(turn)]), 5.0, 0.1)
     points = spread_points(tight.polygons, 8)
     look_ahead(points, (1.0, 1.0), Limits(step_m=0.5, bound_m=0.1), steps=2)
     ball = Ellipsoid.ball(np.zeros(3), 1.0)

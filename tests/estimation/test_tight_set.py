@@ -49,7 +49,7 @@ def test_five_hundred_updates(far_m: float, target_step_m: float) -> None:
 
 def test_area_against_a_fine_grid() -> None:
     ratios = []
-    for seed in range(32):
+    for seed in range(12):
         run = Run(seed=seed, robots=1 + seed % 4, epsilon_m=(0.5, 0.1)[seed % 2])
         f = TightSet()
         annuli = []
@@ -61,7 +61,7 @@ def test_area_against_a_fine_grid() -> None:
                 truth = intersection_area(annuli, (*corners.min(axis=0), *corners.max(axis=0)))
                 ratios.append(f.area_m2 / truth)
     assert min(ratios) > 0.97
-    assert np.median(ratios) < 1.03 and np.quantile(ratios, 0.9) < 1.1, np.quantile(ratios, [0.5, 0.9, 1.0])
+    assert np.median(ratios) < 1.03 and max(ratios) < 1.12, np.quantile(ratios, [0.5, 0.9, 1.0])
 
 
 @pytest.mark.parametrize(("range_m", "bound_m"), [(20.0, 0.5), (0.1, 0.5), (300.0, 0.2), (0.0, 0.0)])
@@ -209,11 +209,12 @@ def test_reports_and_refusals() -> None:
 @pytest.mark.parametrize("outliers", ["reject", "relaxed"])
 def test_five_per_cent_of_corrupt_ranges(outliers: str) -> None:
     lost = []
-    for seed in range(200):
+    # The relaxed rule keeps three sets and costs ten times as much.
+    for seed in range(200 if outliers == "reject" else 100):
         run = Run(seed=seed, robots=1 + seed % 4, corrupt=0.05)
         f = TightSet(outliers=outliers)  # type: ignore[arg-type]
         for step in run.steps():
             f.measure(step.anchor, step.range_m, run.epsilon_m)
         if not f.contains(step.target):
             lost.append(seed)
-    assert len(lost) <= (2 if outliers == "reject" else 6), lost
+    assert len(lost) <= (2 if outliers == "reject" else 3), lost
