@@ -21,6 +21,17 @@ SECOND = "#2f4bd6"
 LARGE = 190
 """Cells from which on the calls themselves no longer count beside the work: fits are over these maps."""
 
+TITLES = {
+    "one tree": "one tree: algorithms 4 to 6",
+    "tree by tree": "all modifications: algorithm 7, tree by tree",
+    "by messages": "all modifications: by messages",
+    "exact": "all trees: exact",
+}
+"""Of what is timed by `complexity_runs.time_redeployment`."""
+
+CLAIMS = {"one tree": (1,), "tree by tree": (4, 5), "by messages": (4,)}
+"""Slopes over k that the thesis names."""
+
 Key = Callable[[MapRun], float]
 
 
@@ -68,59 +79,53 @@ def draw_once(runs: Sequence[MapRun], folder: Path) -> dict[str, tuple[Fit, Fit]
 
 def draw_steiner(timings: Sequence[Timing], folder: Path) -> dict[str, list[tuple[int, Fit]]]:
     """Figures 44 and 45. Returns fits over the cells for each number of terminals, and over those for each map."""
-    sizes, numbers = _sizes(timings), _cells(timings)
-    shades = _shades(max(len(sizes), len(numbers)))
+    by_size = {size: _fit_large([t for t in timings if t.size == size]) for size in _sizes(timings)}
+    by_cells = {}
+    for cells in _cells(timings):
+        some = [t for t in timings if t.cells == cells]
+        by_cells[cells] = fit_exponential([t.size for t in some], [t.mean_s for t in some])
+    spread = "mean, least and most of the trials"
+
     figure = drawing.new_figure(11.5, 5.4)
-    figure.suptitle(
-        "Fig. 44: exact Steiner trees by cells; mean, least and most of the trials", fontsize=11, x=0.01, ha="left"
-    )
-    over_cells, over_terminals = [], []
+    figure.suptitle(f"Fig. 44: exact Steiner trees by cells; {spread}", fontsize=11, x=0.01, ha="left")
     for number, logarithmic in enumerate((False, True)):
         axes = figure.add_subplot(1, 2, number + 1)
-        for shade, size in zip(shades, sizes, strict=False):
+        for shade, (size, fit) in zip(_shades(len(by_size)), by_size.items(), strict=True):
             some = [t for t in timings if t.size == size]
-            label = f"{size} terminals"
+            label = f"{size} terminals" + (f": slope {fit.slope:.1f}" if logarithmic else "")
+            _draw_bars(axes, some, [t.cells for t in some], shade, label, "o")
             if logarithmic:
-                over_cells.append((size, fit := _fit_large(some)))
                 _draw_law(axes, [t.cells for t in _large(some)], fit, shade, "_")
-                label += f": slope {fit.slope:.1f}"
-            _draw_bars(axes, some, [t.cells for t in some], shade, label)
         if logarithmic:
-            axes.set(xscale="log", yscale="log")
-            _draw_slope(axes, [(t.cells, t.mean_s) for t in timings if t.size == sizes[-1]], 2)
+            _count_cells(axes)
+            _draw_slope(axes, [(t.cells, t.mean_s) for t in _large(some)], 2)
         drawing.dress_series(axes, "logarithmic" if logarithmic else "as they are", "cells N", "seconds")
         axes.legend(fontsize=7, frameon=False)
     drawing.write_figure(figure, folder / "fig44-steiner-by-cells.png")
 
     figure = drawing.new_figure(11.5, 5.4)
-    figure.suptitle(
-        "Fig. 45: exact Steiner trees by terminals; mean, least and most of the trials", fontsize=11, x=0.01, ha="left"
-    )
+    figure.suptitle(f"Fig. 45: exact Steiner trees by terminals; {spread}", fontsize=11, x=0.01, ha="left")
     for number, logarithmic in enumerate((False, True)):
         axes = figure.add_subplot(1, 2, number + 1)
-        for shade, cells in zip(shades, numbers, strict=False):
+        for shade, (cells, fit) in zip(_shades(len(by_cells)), by_cells.items(), strict=True):
             some = [t for t in timings if t.cells == cells]
-            label = f"{cells} cells"
-            if logarithmic:
-                over_terminals.append((cells, fit := fit_exponential([t.size for t in some], [t.mean_s for t in some])))
-                label += f": base {fit.slope:.2f}"
-            _draw_bars(axes, some, [t.size for t in some], shade, label, line=True)
+            label = f"{cells} cells" + (f": base {fit.slope:.2f}" if logarithmic else "")
+            _draw_bars(axes, some, [t.size for t in some], shade, label, "o-")
         if logarithmic:
             axes.set_yscale("log")
+            sizes = np.array(list(by_size))
             start = max(t.mean_s for t in timings if t.size == sizes[0])
-            axes.plot(
-                sizes, start * 3.0 ** (np.array(sizes) - sizes[0]), "--", color=drawing.INK, label="base 3 (thesis)"
-            )
+            axes.plot(sizes, start * 3.0 ** (sizes - sizes[0]), "--", color=drawing.INK, label="base 3 (thesis)")
         drawing.dress_series(axes, "logarithmic" if logarithmic else "as they are", "terminals", "seconds")
         axes.legend(fontsize=7, frameon=False)
     drawing.write_figure(figure, folder / "fig45-steiner-by-terminals.png")
-    return {"cells": over_cells, "terminals": over_terminals}
+    return {"cells": list(by_size.items()), "terminals": list(by_cells.items())}
 
 
 def draw_redeployment(timings: Sequence[Timing], folder: Path) -> dict[str, dict[str, list[tuple[int, Fit]]]]:
     """Figures 46 to 50. Returns for each algorithm the fits over the cells for each k, and over k for each map."""
     fits: dict[str, dict[str, list[tuple[int, Fit]]]] = {}
-    for algorithm in dict.fromkeys(t.algorithm for t in timings):
+    for algorithm in TITLES:
         some = [t for t in timings if t.algorithm == algorithm]
         over_nodes = fit_exponential if algorithm == "exact" else fit_power
         fits[algorithm] = {
@@ -130,112 +135,64 @@ def draw_redeployment(timings: Sequence[Timing], folder: Path) -> dict[str, dict
                 for cells in _cells(some)
             ],
         }
-    one = ("one tree",)
-    _draw_searches(
-        timings,
-        one,
-        fits,
-        "cells",
-        2,
-        "Fig. 46: one tree (algorithms 4 to 6) by cells",
-        folder / "fig46-one-tree-by-cells.png",
+    one, all_of_them = list(TITLES)[:1], list(TITLES)[1:]
+    figures = (
+        (46, one, "by cells", "fig46-one-tree-by-cells"),
+        (47, one, "by nodes", "fig47-one-tree-by-nodes"),
+        (48, all_of_them, "by cells", "fig48-redeployment-by-cells"),
+        (49, all_of_them, "by nodes, as they are", "fig49-redeployment-by-nodes"),
+        (50, all_of_them, "by nodes", "fig50-redeployment-by-nodes"),
     )
-    _draw_searches(
-        timings, one, fits, "nodes", 1, "Fig. 47: one tree by nodes k", folder / "fig47-one-tree-by-nodes.png"
-    )
-    rest = ("tree by tree", "by messages", "exact")
-    _draw_searches(
-        timings,
-        rest,
-        fits,
-        "cells",
-        2,
-        "Fig. 48: all modifications, tree by tree and by messages, and the exact search, by cells",
-        folder / "fig48-redeployment-by-cells.png",
-    )
-    _draw_searches(
-        timings,
-        rest,
-        fits,
-        "plain nodes",
-        0,
-        "Fig. 49: the same by nodes k",
-        folder / "fig49-redeployment-by-nodes.png",
-    )
-    _draw_searches(
-        timings,
-        rest,
-        fits,
-        "nodes",
-        4,
-        "Fig. 50: the same by nodes k, logarithmic",
-        folder / "fig50-redeployment-by-nodes.png",
-    )
+    for number, algorithms, how, file in figures:
+        figure = drawing.new_figure(1.6 + 4.6 * len(algorithms), 5.4)
+        figure.suptitle(f"Fig. {number}: redeployment {how}", fontsize=11, x=0.01, ha="left")
+        axes = None
+        for place, algorithm in enumerate(algorithms):
+            axes = figure.add_subplot(1, len(algorithms), place + 1, sharey=None if number == 49 else axes)
+            some = [t for t in timings if t.algorithm == algorithm]
+            if how == "by cells":
+                _draw_by_cells(axes, some, dict(fits[algorithm]["cells"]))
+            else:
+                _draw_by_nodes(axes, some, None if number == 49 else dict(fits[algorithm]["nodes"]))
+            drawing.dress_series(axes, TITLES[algorithm], "cells N" if how == "by cells" else "nodes k", "seconds")
+            axes.legend(fontsize=6.5, frameon=False, loc="upper left")
+        drawing.write_figure(figure, folder / f"{file}.png")
     return fits
 
 
-def _draw_searches(
-    timings: Sequence[Timing],
-    algorithms: Sequence[str],
-    fits: dict[str, dict[str, list[tuple[int, Fit]]]],
-    over: str,
-    slope: float,
-    title: str,
-    file: Path,
-) -> None:
-    """A panel for each algorithm, one above it all logarithmic unless ``over`` is plain."""
-    figure = drawing.new_figure(6.4 if len(algorithms) == 1 else 14.5, 5.4)
-    figure.suptitle(title, fontsize=11, x=0.01, ha="left")
-    axes = None
-    for number, algorithm in enumerate(algorithms):
-        axes = figure.add_subplot(1, len(algorithms), number + 1, sharey=axes if "plain" not in over else None)
-        some = [t for t in timings if t.algorithm == algorithm]
-        by_cells = over == "cells"
-        groups = _sizes(some) if by_cells else _cells(some)
-        for shade, group in zip(_shades(len(groups)), groups, strict=True):
-            members = [t for t in some if (t.size if by_cells else t.cells) == group]
-            xs, ys = [t.cells if by_cells else t.size for t in members], [t.mean_s for t in members]
-            label = f"k = {group}" if by_cells else f"{group} cells"
-            if "plain" not in over:
-                fit = dict(fits[algorithm][over])[group]
-                label += f": {'base' if algorithm == 'exact' and not by_cells else 'slope'} {fit.slope:.2f}"
-            order = np.argsort(xs, kind="stable")
-            axes.plot(
-                np.array(xs)[order], np.array(ys)[order], "o-", color=shade, markersize=3.5, linewidth=0.9, label=label
-            )
-        if "plain" not in over:
-            axes.set(xscale="log", yscale="log")
-            last = [
-                (t.cells if by_cells else t.size, t.mean_s)
-                for t in some
-                if (t.size if by_cells else t.cells) == groups[-1]
-            ]
-            if not (algorithm == "exact" and not by_cells):
-                _draw_slope(axes, last, slope)
-            if algorithm == "tree by tree" and not by_cells:
-                _draw_slope(axes, last, 5)
-            if not by_cells:
-                axes.set_xticks(_sizes(some), [str(size) for size in _sizes(some)])
-                axes.minorticks_off()
-        what = {
-            "one tree": "one tree",
-            "tree by tree": "algorithm 7, tree by tree",
-            "by messages": "algorithm 7, by messages",
-        }
-        drawing.dress_series(
-            axes, what.get(algorithm, "exact, all trees"), "cells N" if by_cells else "nodes k", "seconds"
-        )
-        axes.legend(fontsize=6.5, frameon=False, loc="upper left")
-    drawing.write_figure(figure, file)
+def _draw_by_cells(axes: Axes, some: Sequence[Timing], fits: dict[int, Fit]) -> None:
+    """A curve for each number of nodes."""
+    for shade, (size, fit) in zip(_shades(len(fits)), fits.items(), strict=True):
+        members = sorted((t.cells, t.mean_s) for t in some if t.size == size)
+        label = f"k = {size}: slope {fit.slope:.2f}"
+        axes.plot(*zip(*members, strict=True), "o-", color=shade, markersize=3.5, linewidth=0.9, label=label)
+    _count_cells(axes)
+    _draw_slope(axes, [(t.cells, t.mean_s) for t in _large([t for t in some if t.size == max(fits)])], 2)
 
 
-def _draw_bars(
-    axes: Axes, some: Sequence[Timing], xs: Sequence[int], shade: str, label: str, line: bool = False
-) -> None:
+def _draw_by_nodes(axes: Axes, some: Sequence[Timing], fits: dict[int, Fit] | None) -> None:
+    """A curve for each map; without fits, no logarithms."""
+    maps = _cells(some)
+    exact = some[0].algorithm == "exact"
+    for shade, cells in zip(_shades(len(maps)), maps, strict=True):
+        members = sorted((t.size, t.mean_s) for t in some if t.cells == cells)
+        label = f"{cells} cells"
+        if fits is not None:
+            label += f": {'base' if exact else 'slope'} {fits[cells].slope:.2f}"
+        axes.plot(*zip(*members, strict=True), "o-", color=shade, markersize=3.5, linewidth=0.9, label=label)
+    if fits is not None:
+        axes.set(xscale="linear" if exact else "log", yscale="log")
+        for slope in CLAIMS.get(some[0].algorithm, ()):
+            _draw_slope(axes, members, slope)
+    axes.set_xticks(_sizes(some), [str(size) for size in _sizes(some)])
+    axes.set_xticks([], minor=True)
+
+
+def _draw_bars(axes: Axes, some: Sequence[Timing], xs: Sequence[int], shade: str, label: str, style: str) -> None:
     order = np.argsort(xs, kind="stable")
     low, mean, high = np.array([(t.least_s, t.mean_s, t.most_s) for t in some])[order].T
     axes.errorbar(
-        np.array(xs)[order], mean, [mean - low, high - mean], fmt="o-" if line else "o", color=shade, markersize=3.5,
+        np.array(xs)[order], mean, [mean - low, high - mean], fmt=style, color=shade, markersize=3.5,
         linewidth=0.9, capsize=2, elinewidth=0.7, label=label,
     )  # fmt: skip
 
@@ -258,6 +215,14 @@ def _draw_slope(axes: Axes, points: Sequence[tuple[float, float]], slope: float)
         linewidth=1.1,
         label=f"slope {slope:g} (thesis)",
     )
+
+
+def _count_cells(axes: Axes) -> None:
+    """Logarithmic axes, with numbers of cells on the one."""
+    ticks = (25, 50, 100, 200, 400, 800)
+    axes.set(xscale="log", yscale="log")
+    axes.set_xticks(ticks, [str(tick) for tick in ticks])
+    axes.set_xticks([], minor=True)
 
 
 def _fit_large(some: Sequence[Timing]) -> Fit:

@@ -145,8 +145,7 @@ def time_redeployment(run: MapRun, seed: int = 0) -> Iterator[Timing]:
         move = run.lengths[rng.integers(0, len(run.W), number)].copy()
         move[:2] = np.inf
         move[[0, 1], rng.integers(0, len(run.W), 2)] = 0.0
-        order = [0, *range(2, number), 1]
-        line = np.column_stack((order[:-1], order[1:])).astype(np.int64)
+        line = line_tree(number)
         nodes = list(range(number))
         works: dict[str, Callable[[], object]] = {
             "one tree": partial(place_nodes, links, move, line, nodes),
@@ -156,6 +155,12 @@ def time_redeployment(run: MapRun, seed: int = 0) -> Iterator[Timing]:
         }
         for name, work in works.items():
             yield _timing(run, number, name, [shortest_time(work)])
+
+
+def line_tree(number: int) -> Ints:
+    """Base 0, robots 2 to k − 1, agent 1 in a line: (k − 1, 2) int."""
+    order = np.array([0, *range(2, number), 1])
+    return np.column_stack((order[:-1], order[1:]))
 
 
 def place_each(links: Links, move: Floats, topologies: Sequence[Ints], priced: Floats) -> float:

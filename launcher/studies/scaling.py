@@ -1,4 +1,4 @@
-"""How times grow: measured as the shortest of some runs, and fitted by straight lines in logarithms."""
+"""How times grow: processor times, the shortest of some runs, fitted by straight lines in logarithms."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Fit:
 
 
 def fit_power(x: ArrayLike, y: ArrayLike) -> Fit:
-    """y = factor · x^slope by least squares in log x and log y.
+    """Fit y = factor · x^slope by least squares in log x and log y.
 
     Args:
         x: (n,) positive, at least two different.
@@ -48,7 +48,7 @@ def fit_power(x: ArrayLike, y: ArrayLike) -> Fit:
 
 
 def fit_exponential(x: ArrayLike, y: ArrayLike) -> Fit:
-    """y = factor · slope^x by least squares in log y.
+    """Fit y = factor · slope^x by least squares in log y.
 
     Args:
         x: (n,), at least two different.
@@ -72,20 +72,21 @@ def _fit_line(x: np.ndarray, y: np.ndarray) -> tuple[float, float, float, float,
 
 
 def shortest_time(work: Callable[[], object]) -> float:
-    """Seconds that some work takes at its quickest: what other work on the machine adds falls away.
+    """Seconds of processor time that some work of one thread takes at its quickest.
 
-    A first run, in which caches are filled, is not counted unless it alone is above a second.
+    What else runs on the machine takes its turns between and is not counted, though it slows memory down. A first run,
+    in which caches are filled, counts only where it alone takes more than a second.
     """
-    begin = time.perf_counter()
+    begin = time.thread_time()
     work()
-    first = time.perf_counter() - begin
+    first = time.thread_time() - begin
     if first > 1.0:
         return first
     times: list[float] = []
     while len(times) < RUNS or (sum(times) < BUDGET_S and len(times) < MOST_RUNS):
-        begin = time.perf_counter()
+        begin = time.thread_time()
         work()
-        times.append(time.perf_counter() - begin)
+        times.append(time.thread_time() - begin)
     return min(times)
 
 
