@@ -1,8 +1,8 @@
 """The coordination diagram of two robots: where on their paths they would collide, and boxes around that.
 
 Symbols: robot i is at p_i + κ_i v_i on a segment of its path, κ_i in [0, 1], robot j likewise; S is the sum of their
-radii. They collide at the points (κ_i, κ_j) of the unit square with |p_i + κ_i v_i − p_j − κ_j v_j| < S (eq. 50): part of
-an ellipse, or of a strip where the segments are parallel, convex in any case.
+radii. They collide at the points (κ_i, κ_j) of the unit square with |p_i + κ_i v_i − p_j − κ_j v_j| < S (eq. 50), part
+of an ellipse, or of a strip where the segments are parallel: a convex region in any case.
 
 The box around that region needs no conic. Some κ_j collides with a given κ_i exactly if the point p_i + κ_i v_i is
 nearer than S to the segment of j; so the box spans, in κ_i, what segment i has inside the *stadium* around segment j:

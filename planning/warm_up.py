@@ -16,6 +16,7 @@ def exercise() -> None:
     from planning.foresight import chain_holds
     from planning.geodesic import GeodesicMap
     from planning.grid_outline import outline
+    from planning.motion_plan import TimedPath
     from planning.mutual_visibility import mutual_visibility
     from planning.ordered_chain import search_in_order
     from planning.placement import reachable_positions
@@ -23,6 +24,7 @@ def exercise() -> None:
     from planning.redeployment import redeploy
     from planning.shortest_paths import all_pairs, from_source
     from planning.steiner import steiner_tree
+    from planning.visible_interval import sees_throughout, visible_intervals, visible_times
 
     outline(np.ones((4, 4), dtype=np.bool_), np.ones((4, 4)), 1.0)
     rooms = Environment(
@@ -42,6 +44,9 @@ def exercise() -> None:
     geodesics.nearest((-1.0, -1.0))
     collision_boxes(points[:2], points[2:], 0.4)
     bound_collisions(points[None, :2], points[None, 2:], 0.4)
+    visible_intervals(rooms, points[:2], points[2:])
+    visible_times(rooms, TimedPath(points[:2], [0.0, 1.0]), TimedPath.standing(points[2]))
+    sees_throughout(rooms, points[:2], points[2:])
     graph = PlacementGraph.from_points(rooms, 0.2, 2.0)
     graph.distances_from(points[0])
     _ = graph.distances
