@@ -23,7 +23,8 @@ Ints = NDArray[np.int64]
 CornerIndices = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
-NO_WALL: Final = -1
+NONE: Final = -1
+"""No wall."""
 
 
 @kernel
@@ -112,79 +113,49 @@ def _find_bridge(
 
 @kernel
 def find_entering(
-    corners: Floats,
-    starts: Ints,
-    i: int,
-    j: int,
-    walls: Floats,
-    after: Ints,
-    facing: Ints,
-    behind: Bools,
-    most: int,
-    entering: Ints,
-    ends: Ints,
-) -> tuple[int, int, int]:
-    """Which walls enter the hull of two polygons, and which of their ends lie between its bridges.
+    corners: Floats, p: int, p_end: int, q: int, q_end: int, walls: Floats, candidates: Ints, count: int, most: int
+) -> tuple[int, int]:
+    """Which of the first ``count`` candidate walls enter the hull of two disjoint convex polygons.
 
-    Args:
-        corners: (C, 2), of N polygons.
-        starts: (N + 1,), where the corners of each start.
-        i: the first polygon.
-        j: the second.
-        walls: (V, 4).
-        after: (V,).
-        facing: walls with a corner of the first polygon in front.
-        behind: (N, V), which polygons have a corner behind which walls.
-        most: the search ends with so many walls.
-        entering: filled with walls, (V,).
-        ends: filled with vertices, some of them twice, (2 V,).
+    They are put in front of the other candidates. The search ends with so many as ``most``, or with a wall that parts
+    the polygons, so that no point of one sees a point of the other.
 
     Returns:
-        How many walls, how many ends, and the wall that parts the polygons, so that no point of one sees a point of the
-        other: `NO_WALL`, or the search has ended with it.
-
-    Complexity: O(corners + V).
+        The number of walls that enter, and the wall that parts the polygons, or `NONE`.
     """
-    candidates = 0
-    for w in facing:
-        entering[candidates] = w
-        candidates += behind[j, w]
-    if candidates == 0:
-        return 0, 0, NO_WALL
-    a, b, c, d = find_bridges(corners, starts[i], starts[i + 1], starts[j], starts[j + 1])
+    a, b, c, d = find_bridges(corners, p, p_end, q, q_end)
     ax, ay, bx, by = corners[a, 0], corners[a, 1], corners[b, 0], corners[b, 1]
     cx, cy, dx, dy = corners[c, 0], corners[c, 1], corners[d, 0], corners[d, 1]
-    walls_found = ends_found = 0
-    for k in range(candidates):
-        w = entering[k]
+    found = 0
+    for k in range(count):
+        w = candidates[k]
         x, y = walls[w, 0], walls[w, 1]
         start_left = _side(ax, ay, bx, by, x, y) > 0.0
-        start_right = _side(cx, cy, dx, dy, x, y) < 0.0
         end_left = _side(ax, ay, bx, by, walls[w, 2], walls[w, 3]) > 0.0
+        if start_left and end_left:
+            continue
+        start_right = _side(cx, cy, dx, dy, x, y) < 0.0
         end_right = _side(cx, cy, dx, dy, walls[w, 2], walls[w, 3]) < 0.0
-        if (start_left and end_left) or (start_right and end_right):
+        if start_right and end_right:
             continue
         crosses_left = start_left != end_left and crosses(walls, w, ax, ay, bx, by)
         crosses_right = start_right != end_right and crosses(walls, w, cx, cy, dx, dy)
         if crosses_left and crosses_right:
-            return walls_found, ends_found, int(w)
-        start_between = not (start_left or start_right)
+            return found, int(w)
         if (
             crosses_left
             or crosses_right
-            or (start_between and _side(cx, cy, ax, ay, x, y) <= 0.0 and _side(dx, dy, bx, by, x, y) >= 0.0)
+            or (
+                not (start_left or start_right)
+                and _side(cx, cy, ax, ay, x, y) <= 0.0
+                and _side(dx, dy, bx, by, x, y) >= 0.0
+            )
         ):
-            entering[walls_found] = w
-            walls_found += 1
-            if start_between:
-                ends[ends_found] = w
-                ends_found += 1
-            if not (end_left or end_right):
-                ends[ends_found] = after[w]
-                ends_found += 1
-            if walls_found == most:
+            candidates[found] = w
+            found += 1
+            if found == most:
                 break
-    return walls_found, ends_found, NO_WALL
+    return found, NONE
 
 
 @kernel

@@ -23,7 +23,7 @@ from scipy.sparse.csgraph import depth_first_order
 
 from planning.decomposition import Cells, decompose, measure_cells
 from planning.hull_obstacles import (
-    NO_WALL,
+    NONE,
     CornerIndices,
     crosses,
     find_entering,
@@ -128,7 +128,9 @@ def _find_visible(
     """
     seen = np.zeros((len(starts) - 1, len(starts) - 1), np.bool_)
     front, behind = sort_walls(parent_corners, parent_starts, walls)
-    right, left = find_tangents(corners, starts, walls if divided else walls[:0])
+    vertices = walls if divided else walls[:0]
+    parent_right, parent_left = find_tangents(parent_corners, parent_starts, vertices)
+    right, left = find_tangents(corners, starts, vertices)
     hides = np.zeros(len(order), np.int64)  # by parent: the wall that last hid it
     entering, ends = np.empty(len(walls), np.int64), np.empty(2 * len(walls), np.int64)
     for row in range(len(order)):
@@ -149,24 +151,32 @@ def _find_visible(
                 if crosses(walls, hides[j], px, py, qx, qy):
                     last = hides[j]
                     continue
-            number, ends_number, parting = find_entering(
-                parent_corners,
-                parent_starts,
-                i,
-                j,
-                walls,
-                after,
-                facing,
-                behind,
-                len(walls) if divided else 1,
-                entering,
-                ends,
-            )
-            if parting == NO_WALL and number > 0 and not divided:
-                parting = entering[0]
-            if parting != NO_WALL:
-                last = hides[j] = parting
-                continue
+            number = 0
+            for w in facing:
+                entering[number] = w
+                number += behind[j, w]
+            if number > 0:
+                number, parting = find_entering(
+                    parent_corners,
+                    parent_starts[i],
+                    parent_starts[i + 1],
+                    parent_starts[j],
+                    parent_starts[j + 1],
+                    walls,
+                    entering,
+                    number,
+                    len(walls) if divided else 1,
+                )
+                if number > 0 and not divided:
+                    parting = entering[0]
+                if parting != NONE:
+                    last = hides[j] = parting
+                    continue
+            ends_number = 0
+            if number > 0:
+                ends_number = _find_ends(
+                    parent_corners, parent_right, parent_left, i, j, walls, after, entering, number, ends
+                )
             for k in range(member_starts[i], member_starts[i + 1]):
                 p = members[k]
                 for m in range(member_starts[j], member_starts[j + 1]):
@@ -188,6 +198,32 @@ def _find_visible(
                     if not hidden:
                         seen[p, q] = seen[q, p] = True
     return seen
+
+
+@kernel
+def _find_ends(
+    corners: Floats,
+    right: CornerIndices,
+    left: CornerIndices,
+    i: int,
+    j: int,
+    walls: Floats,
+    after: Ints,
+    entering: Ints,
+    count: int,
+    ends: Ints,
+) -> int:
+    """The ends of the first ``count`` entering walls that lie inside the hull of i and j, each once, and how many."""
+    found = 0
+    for k in range(count):
+        for v in (entering[k], after[entering[k]]):
+            new = is_inside_hull(corners, walls[v, 0], walls[v, 1], right[i, v], left[i, v], right[j, v], left[j, v])
+            for e in range(found):
+                new = new and ends[e] != v
+            if new:
+                ends[found] = v
+                found += 1
+    return found
 
 
 @kernel
