@@ -291,7 +291,7 @@ def _sum_up(weighed: Sequence[Weighed], example: Weighed) -> str:
         rows.append(
             f"| {one.name} | {len(one.pairs[0])} | {1 / one.scale:.2f} m | {exponential.std():.2f} | "
             f"{inverse.mean():.4g} | {inverse.std():.4g} | {lopsided:+.2f} | "
-            f"{real.costs('exponential area').mean():.3g} | {in_metres:+.2f} |"
+            f"{real.costs['exponential area'].mean():.3g} | {in_metres:+.2f} |"
         )
     aspect = [one for one in scaled if one.kind == "aspect"]
     nearest = min(aspect, key=lambda one: abs(one.costs["exponential area"].std() - EXPONENTIAL_AREA[1]))
@@ -305,7 +305,7 @@ def _sum_up(weighed: Sequence[Weighed], example: Weighed) -> str:
     balanced = min(AREA_WEIGHTS, key=lambda weight: abs(mixed[weight][0] - mixed[weight][1]))
     balance = describe(example.costs["normalised"])
     both = [
-        float(np.corrcoef(example.costs["normalised"], example.costs(measure))[0, 1])
+        float(np.corrcoef(example.costs["normalised"], example.costs[measure])[0, 1])
         for measure in ("distance", "exponential area")
     ]
     return "\n".join(
@@ -315,8 +315,8 @@ def _sum_up(weighed: Sequence[Weighed], example: Weighed) -> str:
             "length, and the thesis does not say its own; at the *unit* below, exp(−area) + exp(−area) has the mean of "
             f"fig. 26, {EXPONENTIAL_AREA[0]:g}. The other columns up to the first skewness are at that unit, the last "
             "two in metres as packaged.\n",
-            "| map | pairs | unit | exp: deviation | inverse: mean | inverse: deviation | normalised: skewness | exp in "
-            "metres: mean | normalised in metres: skewness |",
+            "| map | pairs | unit | exp: deviation | inverse: mean | inverse: deviation | normalised: skewness | exp "
+            "in metres: mean | normalised in metres: skewness |",
             "|---|---|---|---|---|---|---|---|---|",
             f"| **thesis, Fig. 21** | ? | ? | {EXPONENTIAL_AREA[1]:g} | {INVERSE_AREA[0]:g} | {INVERSE_AREA[1]:g} | "
             '"almost Gaussian" | – | – |',
@@ -328,7 +328,7 @@ def _sum_up(weighed: Sequence[Weighed], example: Weighed) -> str:
             f"Figures 25 to 30 are drawn of {example.name}, at that unit; `maps.png` of all maps, in metres.\n",
             "- **Fig. 25: the inverse area has a heavy tail.** It has: with aspect cells the deviation is "
             f"{min(_tail(one) for one in aspect):.1f} to {max(_tail(one) for one in aspect):.1f} times the mean "
-            f"(thesis {INVERSE_AREA[1] / INVERSE_AREA[0]:.1f}), with inflection cells, which have few slivers, less.",
+            f"(thesis {INVERSE_AREA[1] / INVERSE_AREA[0]:.1f}).",
             "- **Fig. 26: the exponential is smooth and at most 2.** It is at most 2, and smooth at the right "
             "unit. It says little where all areas are far above 1, or far below: see its mean in metres.",
             "- **Fig. 27: distance alone takes many small hops.** So it does; the figure counts them.",
