@@ -146,11 +146,11 @@ def sum_up(
     drawn = np.mean([one.drawn for one in everything])
     parts = [
         "# Redeployment study\n",
-        f"{number} random redeployments for each map and k: a base, an agent and k − 2 robots of radius {RADIUS_M:g} m, "
-        "deployed at the least cost from random places; then the agent is at another random place. Robots pay their "
-        f"geodesic ways in metres, links μ = {MU_M:g} m times their virtual weight (1.01 to 2.01). *One-edge* starts from "
-        "the tree before, as the thesis does; *repeated* goes on until no edge makes it cheaper; *fixed* keeps the tree. "
-        f"Places that k nodes cannot join were drawn again ({drawn:.2f} draws each).\n",
+        f"{number} random redeployments for each map and k: a base, an agent and k − 2 robots of radius {RADIUS_M:g} m "
+        "are deployed at the least cost from random places; then the agent is at another random place. Robots pay "
+        f"their geodesic ways in metres, links μ = {MU_M:g} m times their virtual weight (1.01 to 2.01). *One-edge* "
+        "starts from the tree before, as the thesis does; *repeated* goes on until no edge makes it cheaper; *fixed* "
+        f"keeps the tree. Places that k nodes cannot join were drawn again ({drawn:.2f} draws each).\n",
     ]
     for search in SEARCHES[1:]:
         parts += [

@@ -39,9 +39,10 @@ def draw_costs(found: Mapping[str, Mapping[int, Sequence[Answer]]], file: Path) 
                 shares = 100.0 * (1.0 - np.arange(len(more)) / len(more))
                 label = f"k = {nodes}, {search}"
                 axes.step(np.minimum(more, 1e4), shares, style, where="pre", color=shade, linewidth=1.3, label=label)
-        axes.set(xscale="log", yscale="log", xlim=(0.1, 1e3), ylim=(0.4, 110))
+        axes.set(xscale="log", yscale="log", xlim=(0.1, 1e3), ylim=(0.4, 115))
         axes.set_yticks([1, 10, 100], ["1 %", "10 %", "100 %"])
-        drawing.dress_series(axes, name, "dearer by at least [%]; right end: none found", "share of redeployments")
+        axes.set_xticks([0.1, 1, 10, 100, 1000], ["0.1", "1", "10", "100", "none"])
+        drawing.dress_series(axes, name, "dearer by at least [%]", "share of redeployments")
     drawing.legend_below(figure, len(next(iter(found.values()))))
     drawing.write_figure(figure, file)
 
@@ -54,6 +55,7 @@ def draw_times(found: Mapping[str, Mapping[int, Sequence[Answer]]], file: Path) 
             times = [1e3 * np.median([one.seconds[search] for one in answers]) for answers in by_nodes.values()]
             axes.semilogy(list(by_nodes), times, "o-", color=COLOURS[search], markersize=4, label=search)
         axes.set_xticks(list(by_nodes))
+        axes.set_ylim(0.04, 60)
         drawing.dress_series(axes, name, "nodes k", "milliseconds")
     drawing.legend_below(figure, len(SEARCHES))
     drawing.write_figure(figure, file)
@@ -61,7 +63,7 @@ def draw_times(found: Mapping[str, Mapping[int, Sequence[Answer]]], file: Path) 
 
 def draw_example(ground: PlacementGraph, task: Task, question: Question, file: Path) -> None:
     """A redeployment by one-edge search beside the optimum: the deployment before, the ways, the deployment after."""
-    figure = drawing.new_figure(12.5, 4.6 if np.ptp(ground.environment.outer[:, 0]) > 40 else 6.0)
+    figure = drawing.new_figure(12.5, 5.6)
     title = f"{ground.environment.name}: one redeployment of base B, agent A and {question.nodes - 2} robots"
     figure.suptitle(f"{title}, μ = {question.mu_m:g} m", fontsize=11, x=0.01, ha="left")
     for number, (name, found) in enumerate(
