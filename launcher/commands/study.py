@@ -25,9 +25,7 @@ def localization(
         from launcher.studies.localization import study_localization
 
         warm_up(tell, ["estimation"])
-        folder = output or _default("localization")
-        # Before the work: a folder that cannot be made costs no time.
-        folder.mkdir(parents=True, exist_ok=True)
+        folder = _made(output, "localization")
         text = study_localization(folder, seeds, tell)
         tell(text)
         tell(f"Figures, tables and summary.md: {folder}")
@@ -62,6 +60,64 @@ def ranges(
             text = study_target(folder, known, speed_m_s, bound_m, tell)
         tell(text.rstrip())
         tell(f"Figure and tables: {folder}")
+
+
+@app.command()
+def complexity(
+    quick: Annotated[bool, typer.Option("--quick", help="Only maps of at most 200 cells; some seconds.")] = False,
+    output: Output = None,
+) -> None:
+    """Count cells and time every planning algorithm: thesis §4.1, Tables 1 to 3 and figures 41 to 50."""
+    with plainly():
+        from launcher.kernels import warm_up
+        from launcher.studies.complexity import study_complexity
+
+        warm_up(tell, ["planning"])
+        folder = _made(output, "complexity")
+        tell(study_complexity(folder, quick, tell))
+        tell(f"Figures, tables and summary.md: {folder}")
+
+
+@app.command()
+def weights(
+    shown: Annotated[
+        Literal["room1", "room2", "room3", "l457mod"], typer.Option("--map", help="Whose aspect cells are drawn.")
+    ] = "room3",
+    output: Output = None,
+) -> None:
+    """Weigh the edges of the mutual visibility graphs: thesis §3.3.1, figures 25 to 30."""
+    with plainly():
+        from launcher.kernels import warm_up
+        from launcher.studies.weights import study_weights
+
+        warm_up(tell, ["planning"])
+        folder = _made(output, "weights")
+        tell(study_weights(folder, shown, tell))
+        tell(f"Figures, tables and summary.md: {folder}")
+
+
+@app.command()
+def redeployment(
+    number: Annotated[int, typer.Option(min=2, max=10_000, help="Redeployments of each map and team size.")] = 200,
+    seed: Annotated[int, typer.Option(min=0, help="Of the random places.")] = 0,
+    output: Output = None,
+) -> None:
+    """How much the optimum over all trees saves beside searches near the present tree, on the thesis' maps."""
+    with plainly():
+        from launcher.kernels import warm_up
+        from launcher.studies.redeployment import study_redeployment
+
+        warm_up(tell, ["planning"])
+        folder = _made(output, "redeployment")
+        tell(study_redeployment(folder, number, seed, tell=tell))
+        tell(f"Figures, tables and summary.md: {folder}")
+
+
+def _made(output: Path | None, name: str) -> Path:
+    """The folder to write to; a folder that cannot be made costs no time."""
+    folder = output or _default(name)
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
 
 
 def _default(name: str) -> Path:
