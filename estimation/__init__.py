@@ -12,9 +12,9 @@ from estimation.containment_monitor import ContainmentMonitor, Verdict
 from estimation.ellipsoid import Ellipsoid, EmptyIntersection, NotAnEllipsoid
 from estimation.feasible_set import EmptyFeasibleSet, FeasibleSet, Region
 from estimation.fusion import choose_weight, fuse
-from estimation.information_control import NotAnEstimate, covariance_direction, information_gradient
+from estimation.information_control import Limits, NotAnEstimate, covariance_direction, information_gradient
 from estimation.information_filter import InformationFilter
-from estimation.look_ahead import Limits, look_ahead
+from estimation.look_ahead import look_ahead
 from estimation.outlier_rule import Relaxation
 from estimation.range_embedding import NotAMeasurement, RangeEmbedding, range_bounds
 from estimation.range_filter import FilterReport, FilterSnapshot, RangeFilter

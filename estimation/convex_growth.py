@@ -146,6 +146,11 @@ def grow(pieces: Floats, counts: Ints, distance: float, out: Floats, kept: Ints)
             for j in range(i):
                 if kept[i] == 0 or kept[j] == 0:
                     continue
+                for k in (i, j):
+                    # Every line that parts a piece from another may leave a vertex more.
+                    if kept[k] > SCRATCH - 4:
+                        kept[k] = simplify(grown[k], kept[k], SCRATCH // 2)
+                        _bound(grown[k], kept[k], box[k])
                 if box[i, 0] > box[j, 2] or box[j, 0] > box[i, 2] or box[i, 1] > box[j, 3] or box[j, 1] > box[i, 3]:
                     continue
                 kept[i], kept[j], parted = part(grown[i], kept[i], grown[j], kept[j], other)

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from estimation.information_control import covariance_direction
+from estimation.information_control import Limits, check_position, turn_about
 
 Floats = NDArray[np.float64]
 
@@ -107,15 +107,26 @@ class InformationFilter:
             y, Y = y + i, Y + np.outer(H, H) / deviation_m**2
         return InformationFilter(y, Y)
 
-    def direction(self, position: ArrayLike) -> Floats:
+    def direction(self, position: ArrayLike, limits: Limits) -> Floats:
         """The control law of §2.4.1: the gradient of ½ tr(Y⁻¹ I), I = HᵀR⁻¹H, by the robot's position.
 
         With H = uᵀ, the line of sight, ½ tr(P uuᵀ)/R has the gradient −(I − uuᵀ) P u / (R r): the covariance law, with
-        P in the place of the set's covariance. The same degenerate cases: zero while nothing is known; circling.
+        P in the place of the set's covariance, and the same degenerate cases (:mod:`estimation.information_control`).
+
+        Args:
+            position: (2,) float, metres, map frame: the robot.
+            limits: of the robot.
+
+        Returns:
+            (2,) float: a unit vector, or zero.
+
+        Raises:
+            NotAnEstimate: the position is not two finite numbers.
         """
-        if not self.known:
+        a = check_position(position)
+        if not self.known or limits.step_m == 0:
             return np.zeros(2)
-        return covariance_direction(self.mean, self.covariance, position)
+        return turn_about(self.mean, self.covariance, a)
 
 
 def _sight(x: Floats, a: Floats) -> tuple[Floats, float]:

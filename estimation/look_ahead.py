@@ -10,42 +10,36 @@ It sees what no gradient does: mirror images, two far regions, and paths that pa
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from estimation.information_control import NotAnEstimate
+from estimation.information_control import Limits, NotAnEstimate, check_position
 from estimation.kernel import kernel
+from estimation.spread import spread_points
 
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Limits:
-    """What the robot that decides can do.
+POINTS = 64
+"""Points that stand for the set; the cost rises with their square."""
 
-    Attributes:
-        step_m: how far it drives from one range to the next, metres.
-        bound_m: ε, half-width of the interval that a range of it stands for, metres.
-        headings: how many first headings are tried, evenly spread.
 
-    Raises:
-        NotAnEstimate: a number is not positive.
-    """
+class CoveredSet(Protocol):
+    """A set as convex pieces: a :class:`estimation.tight_set.TightSet`."""
 
-    step_m: float
-    bound_m: float
-    headings: int = 24
+    @property
+    def started(self) -> bool:
+        """Whether anything is known."""
 
-    def __post_init__(self) -> None:
-        if not (0 < self.step_m < math.inf and 0 < self.bound_m < math.inf and self.headings > 0):
-            raise NotAnEstimate(f"step, bound and number of headings must be positive and finite, not {self}")
+    @property
+    def polygons(self) -> tuple[Floats, ...]:
+        """The pieces, (n, 2) float each, counter-clockwise, metres, map frame."""
 
 
 def look_ahead(
-    points: ArrayLike,
+    shared: CoveredSet,
     position: ArrayLike,
     limits: Limits,
     steps: int = 1,
@@ -57,39 +51,42 @@ def look_ahead(
     third of a circle: driving on past a target and rounding it are both in the fan.
 
     Args:
-        points: (k, 2) float, metres: spread evenly over the set, see :func:`estimation.spread.spread_points`; k = 0
-            when there is no estimate yet. About 100 are enough, 300 cost nine times as much.
-        position: (2,) float, metres: the robot.
+        shared: the set that the team shares; :data:`POINTS` points spread evenly stand for it.
+        position: (2,) float, metres, map frame: the robot.
         limits: of the robot.
         steps: ranges to predict, at least 1; with 1 all paths are one straight step.
         judge: the expected share that is left, or an upper bound of the worst: for the target and the noise
             that leave most.
 
     Returns:
-        (2,) float: a unit vector; zero when the set has fewer than two points. Ties go to the first heading,
-        counter-clockwise from +x.
+        (2,) float: a unit vector; zero when there is no estimate yet, when the robot cannot move, and when the set is
+        no larger than a point. Ties go to the first heading, counter-clockwise from +x.
 
     Raises:
-        NotAnEstimate: shapes do not fit, a number is not finite, or steps < 1.
+        NotAnEstimate: the position is not two finite numbers, or steps < 1.
 
-    Complexity: O(paths · steps · k²): 5 steps of 24 headings, three paths each, at k = 64 take about 2 ms.
+    Complexity: O(paths · steps · points²): 5 steps of 24 headings, three paths each, take about 2 ms.
     """
-    cloud, a = np.ascontiguousarray(points, dtype=np.float64), np.asarray(position, dtype=np.float64)
-    if cloud.ndim != 2 or cloud.shape[1] != 2 or a.shape != (2,) or steps < 1:
-        raise NotAnEstimate(
-            f"look-ahead needs points (k, 2), a position (2,) and steps of at least 1, "
-            f"not {cloud.shape}, {a.shape} and {steps}"
-        )
-    if not (np.isfinite(cloud).all() and np.isfinite(a).all()):
-        raise NotAnEstimate("look-ahead needs finite points and a finite position, in metres")
-    if len(cloud) < 2:
+    a = check_position(position)
+    if steps < 1:
+        raise NotAnEstimate(f"looking ahead takes at least 1 step, not {steps}")
+    if not shared.started:
+        return np.zeros(2)
+    return best_heading(spread_points(shared.polygons, POINTS), a, limits, steps, judge)
+
+
+def best_heading(
+    points: Floats, position: Floats, limits: Limits, steps: int, judge: Literal["expected", "worst"]
+) -> Floats:
+    """:func:`look_ahead` for a set of points (k, 2) float, metres, that stand for the set."""
+    if len(points) < 2 or limits.step_m == 0:
         return np.zeros(2)
     headings = 2 * math.pi * np.arange(limits.headings) / limits.headings
     turns = np.array([0.0]) if steps == 1 else np.array([0.0, -1.0, 1.0]) * (2 * math.pi / 3 / steps)
     angles = headings[:, None, None] + turns[:, None] * np.arange(steps)
     moves = limits.step_m * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-    paths = (a + np.cumsum(moves, axis=2)).reshape(-1, steps, 2)
-    left = predict_shares(cloud, paths, limits.bound_m, judge == "worst")
+    paths = (position + np.cumsum(moves, axis=2)).reshape(-1, steps, 2)
+    left = predict_shares(points, paths, limits.bound_m, judge == "worst")
     # A tie, within rounding, must not be decided by rounding: peers on other machines decide too.
     best = int(np.argmax(left <= left.min() * (1 + 1e-9))) // len(turns)
     return np.array([math.cos(headings[best]), math.sin(headings[best])])

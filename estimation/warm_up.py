@@ -9,9 +9,9 @@ def exercise() -> None:
     """Find a target that moves, by ranges from three places, with every set and law."""
     from estimation.ellipsoid import Ellipsoid
     from estimation.fusion import fuse
-    from estimation.look_ahead import Limits, look_ahead
+    from estimation.information_control import Limits
+    from estimation.look_ahead import look_ahead
     from estimation.range_filter import RangeFilter
-    from estimation.spread import spread_points
     from estimation.strip import Strip
     from estimation.strip_cut import cut
     from estimation.thesis_filter import ThesisRangeFilter
@@ -34,8 +34,7 @@ def exercise() -> None:
     # More ranges than a tight set remembers, none of them redundant.
     for turn in np.linspace(0.0, 2.0 * np.pi, 40):
         tight.measure(target - 5.0 * np.array([np.cos(turn), np.sin(turn)]), 5.0, 0.1)
-    points = spread_points(tight.polygons, 8)
-    look_ahead(points, (1.0, 1.0), Limits(step_m=0.5, bound_m=0.1), steps=2)
+    look_ahead(tight, (1.0, 1.0), Limits(step_m=0.5, bound_m=0.1), steps=2)
     ball = Ellipsoid.ball(np.zeros(3), 1.0)
     fuse(ball, Ellipsoid.ball(np.full(3, 0.5), 1.0))
     cut(ball, Strip(np.array([1.0, 0.0, 0.0]), -0.5, 0.5))

@@ -15,12 +15,11 @@ from numpy.typing import NDArray
 
 from estimation.ellipsoid import Ellipsoid
 from estimation.feasible_set import FeasibleSet
-from estimation.information_control import covariance_direction, information_gradient
+from estimation.information_control import Limits, covariance_direction, information_gradient
 from estimation.information_filter import InformationFilter
-from estimation.look_ahead import Limits, look_ahead
+from estimation.look_ahead import look_ahead
 from estimation.outlier_rule import Relaxation
 from estimation.range_filter import RangeFilter
-from estimation.spread import spread_points
 from estimation.thesis_filter import ThesisRangeFilter
 from estimation.tight_set import TightSet
 
@@ -29,6 +28,7 @@ Floats = NDArray[np.float64]
 BOUND_M = 0.3
 STEP_M = 0.4
 STEPS = 60
+LIMITS = Limits(STEP_M, BOUND_M)
 CORRUPT_STEP = 34
 """Step of the flawed position, as in fig. 13."""
 FLAW_M = 3.0
@@ -77,25 +77,16 @@ Law = Callable[[Belief, Floats, int], Floats]
 """Belief, position, robot's number → direction."""
 
 
-def _climb_covariance(belief: Belief, position: Floats, _: int) -> Floats:
-    feasible = belief.ellipsoid.feasible_set()
-    return covariance_direction(feasible.centroid, feasible.covariance, position)
-
-
 def _look(steps: int) -> Law:
-    def decide(belief: Belief, position: Floats, _: int) -> Floats:
-        points = spread_points(belief.tight.polygons, 64)
-        return look_ahead(points, position, Limits(STEP_M, BOUND_M), steps)
-
-    return decide
+    return lambda belief, position, _: look_ahead(belief.tight, position, LIMITS, steps)
 
 
 LAWS: Mapping[str, Law] = {
-    "thesis' gradient": lambda belief, position, _: information_gradient(belief.ellipsoid, position),
-    "covariance": _climb_covariance,
+    "thesis' gradient": lambda belief, position, _: information_gradient(belief.ellipsoid, position, LIMITS),
+    "covariance": lambda belief, position, _: covariance_direction(belief.ellipsoid.feasible_set(), position, LIMITS),
     "1 step ahead": _look(1),
     "5 steps ahead": _look(5),
-    "Gaussian": lambda belief, position, _: belief.gaussian.direction(position),
+    "Gaussian": lambda belief, position, _: belief.gaussian.direction(position, LIMITS),
 }
 STRAIGHT = "straight line"
 """Not a law: every robot drives past the target at 1 to 3 m, whatever it hears."""

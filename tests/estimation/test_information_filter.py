@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from estimation.information_control import Limits
 from estimation.information_filter import InformationFilter, NotInformative
 
 
@@ -66,12 +67,12 @@ def test_the_law_is_the_gradient_of_the_information_rate():
 
     for a in np.random.default_rng(4).uniform(-9, 9, (20, 2)):
         gradient = np.array([(rate(a + d) - rate(a - d)) / 2e-5 for d in 1e-5 * np.eye(2)])
-        np.testing.assert_allclose(filter_.direction(a), gradient / np.hypot(*gradient), atol=1e-4)
+        np.testing.assert_allclose(filter_.direction(a, Limits(1, 0.5)), gradient / np.hypot(*gradient), atol=1e-4)
 
 
 def test_nothing_known():
     nothing = InformationFilter.uninformed()
-    assert not nothing.direction((1, 1)).any()
+    assert not nothing.direction((1, 1), Limits(1, 0.5)).any()
     assert nothing.predict(np.eye(2)) is nothing
     with pytest.raises(NotInformative, match="start from a guess"):
         nothing.measure([(0, 0)], [3], 0.5)
