@@ -37,26 +37,31 @@ Key = Callable[[MapRun], float]
 
 def draw_once(runs: Sequence[MapRun], folder: Path) -> dict[str, tuple[Fit, Fit]]:
     """Figures 41 to 43: what is computed once for a map. Returns our fit and the thesis', by what was computed."""
-    cells: Key = lambda run: run.counts["N"]  # noqa: E731
-    panels: tuple[tuple[str, str, str, str, Key, Key, str, float], ...] = (
-        ("decomposition", "Fig. 41: decomposition", "fig41-decomposition", "line segments L",
-         lambda run: run.segments, lambda run: run.decomposition_s, "Td", 2),
-        ("mutual visibility", "Fig. 42: mutual visibility graph", "fig42-visibility", "cells N",
-         cells, lambda run: run.visibility_s, "Tmv", 2),
-        ("all pairs", "Fig. 43: all shortest paths, mutual visibility graph", "fig43-all-pairs", "cells N",
-         cells, lambda run: run.all_pairs_s, "Tpv", 3),
-        ("all adjacency paths", "Fig. 43: all shortest paths, adjacency graph", "fig43-adjacency-paths", "cells N",
-         cells, lambda run: run.adjacency_paths_s, "Tpp", 3),
+    panels: tuple[tuple[str, str, str, Key, str, float], ...] = (
+        ("decomposition", "Fig. 41: decomposition", "fig41-decomposition",
+         lambda run: run.decomposition_s, "Td", 2),
+        ("mutual visibility", "Fig. 42: mutual visibility graph", "fig42-visibility",
+         lambda run: run.visibility_s, "Tmv", 2),
+        ("all pairs", "Fig. 43: all shortest paths, mutual visibility graph", "fig43-all-pairs",
+         lambda run: run.all_pairs_s, "Tpv", 3),
+        ("all adjacency paths", "Fig. 43: all shortest paths, adjacency graph", "fig43-adjacency-paths",
+         lambda run: run.adjacency_paths_s, "Tpp", 3),
     )  # fmt: skip
     fits = {}
-    for name, title, file, across, key, ours, theirs, slope in panels:
+    for name, title, file, ours, theirs, slope in panels:
+        by_segments = name == "decomposition"
+        key: Key = (lambda run: run.segments) if by_segments else (lambda run: run.counts["N"])
         figure = drawing.new_figure(6.4, 5.2)
         axes = figure.add_subplot()
         done = [run for run in runs if np.isfinite(ours(run))]
         known = [run for run in done if run.thesis is not None]
         beyond = [run for run in done if run.thesis is None]
-        large = [run for run in done if run.counts["N"] >= LARGE] if len(done) > 4 else done
-        tables = [(key(run), float(getattr(run.thesis, theirs))) for run in known]
+        large = [run for run in done if run.counts["N"] >= LARGE]
+        large = large if len(large) > 2 else done
+        # At the thesis' own counts, which are not always those of the rebuilt maps.
+        rows = [run.thesis for run in known if run.thesis is not None]
+        sizes = [row.segments if by_segments else row.N for row in rows]
+        tables = [(size, float(getattr(row, theirs))) for size, row in zip(sizes, rows, strict=True)]
         fit = fit_power([key(run) for run in large], [ours(run) for run in large])
         printed = fit_power(*zip(*tables, strict=True))
         fits[name] = fit, printed
@@ -65,13 +70,15 @@ def draw_once(runs: Sequence[MapRun], folder: Path) -> dict[str, tuple[Fit, Fit]
         if beyond:
             xs, ys = [key(run) for run in beyond], [ours(run) for run in beyond]
             axes.loglog(xs, ys, "o", color=BEYOND, label="ours, bitangents the thesis left out")
-        _draw_law(axes, [key(run) for run in large], fit, OURS, f"ours from {LARGE} cells on: slope {fit.slope:.2f}")
+        least = min(run.counts["N"] for run in large)
+        label = f"ours from {least} cells on: slope {fit.slope:.2f}"
+        _draw_law(axes, [key(run) for run in large], fit, OURS, label)
         _draw_law(axes, [x for x, _ in tables], printed, THESIS, f"thesis' times: slope {printed.slope:.2f}")
         _draw_slope(axes, tables, slope)
         if name == "mutual visibility":
-            adjacency = [(key(run), run.thesis.Tad) for run in known if run.thesis]
+            adjacency = [(row.N, row.Tad) for row in rows]
             axes.loglog(*zip(*adjacency, strict=True), "x", color=THESIS, label="thesis, adjacency graph")
-        drawing.dress_series(axes, title, across, "seconds")
+        drawing.dress_series(axes, title, "line segments L" if by_segments else "cells N", "seconds")
         drawing.legend_below(figure, 2)
         drawing.write_figure(figure, folder / f"{file}.png")
     return fits

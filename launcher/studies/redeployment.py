@@ -191,7 +191,7 @@ def sum_up(
 def _told(answers: Sequence[Answer], search: str) -> str:
     _, middle, high, worst, none, _ = measure(answers, search)
     text = " · ".join("∞" if np.isinf(more) else f"{100 * more:.0f}" for more in (middle, high, worst))
-    return f"{text} ({none:.0%})" if none else text
+    return f"{text} ({none:.1%})" if none else text
 
 
 def _totalled(search: str, answers: Sequence[Answer]) -> tuple[str, ...]:

@@ -40,6 +40,11 @@ class Row:
     """All shortest paths of the latter."""
 
     @property
+    def segments(self) -> int:
+        """L: line segments of walls, inflection rays and bitangents."""
+        return self.Lb + self.Lr + self.La
+
+    @property
     def holes(self) -> int:
         """Holes of the environment, by Euler's formula in general position."""
         return 1 + self.I - self.N - self.V - self.Lr + 2 * self.r + self.La // 3
