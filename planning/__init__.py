@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from planning.adjacency_path import AdjacencyPaths
+    from planning.compiled_map import CompiledMap
     from planning.decomposition import Cells, decompose
     from planning.deployment import Deployment
     from planning.deployment_sequence import DeploymentSequence, identify_sequence, physical_cost
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 __all__ = [
     "AdjacencyPaths",
     "Cells",
+    "CompiledMap",
     "Deployment",
     "DeploymentSequence",
     "Environment",
@@ -59,6 +61,7 @@ __all__ = [
 _HOMES = {
     "AdjacencyPaths": "planning.adjacency_path",
     "Cells": "planning.decomposition",
+    "CompiledMap": "planning.compiled_map",
     "Deployment": "planning.deployment",
     "DeploymentSequence": "planning.deployment_sequence",
     "Environment": "planning.environment",
