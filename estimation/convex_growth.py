@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from estimation import convex_polygon
 from estimation.convex_cut import MOST_VERTICES, SCRATCH
-from estimation.convex_polygon import area, clip, hull, simplify
+from estimation.convex_polygon import area, clip, hull, simplify, width
 from estimation.kernel import kernel
 
 Floats = NDArray[np.float64]
@@ -124,8 +124,10 @@ def _crossings(P: Floats, n: int, Q: Floats, m: int, points: Floats) -> int:
 
 
 @kernel
-def grow(pieces: Floats, counts: Ints, distance: float, out: Floats, kept: Ints) -> int:
-    """Write an outer bound of all points within a distance of a set into out and kept; the number of pieces.
+def grow(pieces: Floats, counts: Ints, distance: float, out: Floats, kept: Ints, passed: Floats) -> int:
+    """Write an outer bound of all points within a distance of a set into out, kept and passed; the number of pieces.
+
+    They count as checked at the width that they have then (`estimation.convex_pieces`): growing blurs what was fine.
 
     All pieces grow by the same polygon, and then overlap. The boundaries of two convex sets that were apart and grew by
     the same convex set cross at no more than two points, so they can be parted again.
@@ -167,7 +169,7 @@ def grow(pieces: Floats, counts: Ints, distance: float, out: Floats, kept: Ints)
         n = simplify(grown[i], kept[i], MOST_VERTICES)
         if n:
             out[k, :n] = grown[i, :n]
-            kept[k] = n
+            kept[k], passed[k] = n, width(out[k], n)
             k += 1
     return k
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from estimation import convex_polygon
 from estimation.convex_cut import MOST_VERTICES, SCRATCH, cut_piece
-from estimation.convex_polygon import area, depth, distances, hull, simplify
+from estimation.convex_polygon import area, depth, distances, hull, simplify, width
 from estimation.kernel import kernel
 
 Floats = NDArray[np.float64]
@@ -45,16 +45,6 @@ COARSE = -1.0
 
 FINEST_M = 1e-9
 """Tolerance below which rounding decides."""
-
-
-@kernel
-def width(P: Floats, n: int) -> float:
-    """2 · area / perimeter of a piece, metres."""
-    around = 0.0
-    for i in range(n):
-        j = i + 1 if i + 1 < n else 0
-        around += math.sqrt((P[j, 0] - P[i, 0]) ** 2 + (P[j, 1] - P[i, 1]) ** 2)
-    return 2.0 * area(P, n) / around if around > 0.0 else 0.0
 
 
 @kernel
@@ -141,13 +131,6 @@ def cut(
                 kept[m], passed[m] = n, np.inf if after == COARSE else after
                 m += 1
     return m, changed, telling
-
-
-@kernel
-def check(pieces: Floats, counts: Ints, m: int, passed: Floats) -> None:
-    """Take the first m pieces as checked at their widths."""
-    for i in range(m):
-        passed[i] = width(pieces[i], counts[i])
 
 
 @kernel

@@ -58,6 +58,16 @@ def area(P: Floats, n: int) -> float:
 
 
 @kernel
+def width(P: Floats, n: int) -> float:
+    """2 · area / perimeter of a piece, metres."""
+    around = 0.0
+    for i in range(n):
+        j = i + 1 if i + 1 < n else 0
+        around += math.sqrt((P[j, 0] - P[i, 0]) ** 2 + (P[j, 1] - P[i, 1]) ** 2)
+    return 2.0 * area(P, n) / around if around > 0.0 else 0.0
+
+
+@kernel
 def depth(P: Floats, n: int, x: float, y: float) -> float:
     """How far a point is inside all edges' lines, metres; negative outside."""
     deepest = np.inf

@@ -168,8 +168,8 @@ def critical_lines(form: NormalForm) -> Floats:
 
 
 def first_lines(form: NormalForm) -> Floats:
-    """Lines (m,) that meet every region and every hole."""
-    return np.unique(np.concatenate([np.linspace(-1.0, 1.0, LINES), critical_lines(form)]))
+    """Lines (m,) that meet every region and every hole, in no order."""
+    return np.concatenate([np.linspace(-1.0, 1.0, LINES), critical_lines(form)])
 
 
 def sweep(form: NormalForm, nodes: int, lines: Floats) -> tuple[list[Panel], Floats]:
@@ -180,14 +180,14 @@ def sweep(form: NormalForm, nodes: int, lines: Floats) -> tuple[list[Panel], Flo
     Args:
         form: the set.
         nodes: even.
-        lines: ascending, from −1 to 1.
+        lines: from −1 to 1, in any order.
     """
     h = form.coefficients
     spread = 0.5 * (1.0 - np.cos(np.linspace(0.0, math.pi, nodes + 1)))
     panels: list[Panel] = []
     for _ in range(6):
         events: list[list[float]] = []
-        for first, last in find_events(h, lines).tolist():
+        for first, last in find_events(h, np.unique(lines)).tolist():
             if events and first - events[-1][1] < NARROWEST:
                 events[-1][1] = last
             else:
@@ -201,7 +201,7 @@ def sweep(form: NormalForm, nodes: int, lines: Floats) -> tuple[list[Panel], Flo
                 surprises.append(on)
             panels.append((on, roots[:, : counts[0]]))
         # The ends of events need no bisection again.
-        lines = np.unique(np.concatenate([[-1.0, 1.0], np.ravel(events), *(on for on, _ in panels), *surprises]))
+        lines = np.concatenate([[-1.0, 1.0], np.ravel(events), *(on for on, _ in panels), *surprises])
         if not surprises:
             break
         # Something came and went between two first lines: look again with the lines that saw it.
@@ -225,16 +225,22 @@ def extents(lines: Floats, roots: Floats, M: Floats) -> tuple[float, float]:
     return length, gap
 
 
-def _join(before: Floats, after: Floats) -> tuple[list[tuple[int, int]], list[tuple[int, int]], list[tuple[int, int]]]:
+def _join(
+    before: list[float], after: list[float]
+) -> tuple[list[tuple[int, int]], list[tuple[int, int]], list[tuple[int, int]]]:
     """Which roots go on over an event (old, new), which die in pairs (old, old) and which are born (new, new)."""
     n, m = len(before), len(after)
-    if n == m and (np.maximum(before[::2], after[::2]) <= np.minimum(before[1::2], after[1::2])).all():
+    if n == m and all(max(before[i], after[i]) <= min(before[i + 1], after[i + 1]) for i in range(0, n, 2)):
         return [(i, i) for i in range(n)], [], []
     if abs(n - m) != 2:
         return [], [(i, i + 1) for i in range(0, n, 2)], [(i, i + 1) for i in range(0, m, 2)]
     small, large = (before, after) if n < m else (after, before)
-    shifts = [np.abs(np.delete(large, [i, i + 1]) - small).sum() for i in range(len(small) + 1)]
-    at = int(np.argmin(shifts))
+
+    def shift(at: int) -> float:
+        rest = large[:at] + large[at + 2 :]
+        return sum(abs(one - other) for one, other in zip(rest, small, strict=True))
+
+    at = min(range(len(small) + 1), key=shift)
     kept = [i for i in range(len(large)) if i not in (at, at + 1)]
     through = list(enumerate(kept)) if n < m else [(old, new) for new, old in enumerate(kept)]
     return through, ([] if n < m else [(at, at + 1)]), ([(at, at + 1)] if n < m else [])
@@ -249,8 +255,8 @@ def trace(panels: list[Panel]) -> list[Floats]:
 
     # An end of a piece of boundary: (panel, root, whether it is the upper end).
     for p in range(len(panels) + 1):
-        before = panels[p - 1][1][-1] if p else np.empty(0)
-        after = panels[p][1][0] if p < len(panels) else np.empty(0)
+        before = panels[p - 1][1][-1].tolist() if p else []
+        after = panels[p][1][0].tolist() if p < len(panels) else []
         through, dying, born = _join(before, after)
         for old, new in through:
             link((p - 1, old, True), (p, new, False))

@@ -139,11 +139,10 @@ class _Polygons:
         return _Union(pieces, counts, checked, _NO_ANNULI, area)
 
     def grow(self, held: _Union, distance_m: float) -> _Union:
-        m = convex_growth.grow(held.pieces, held.counts, distance_m, self._out, self._kept)
-        convex_pieces.check(self._out, self._kept, m, self._passed)
+        m = convex_growth.grow(held.pieces, held.counts, distance_m, self._out, self._kept, self._passed)
         annuli = held.annuli.copy()
-        annuli[:, 2] = np.maximum(0.0, annuli[:, 2] - distance_m)
-        annuli[:, 3] += distance_m
+        # An inner radius below 0 bounds nothing, as it should.
+        annuli[:, 2:] += -distance_m, distance_m
         return self._take(m, annuli, MERGE_SHARE_MOVING)
 
 

@@ -107,7 +107,7 @@ def test_the_exact_area_is_that_of_finely_drawn_rings() -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_at_most_a_tenth_too_large(kind: str) -> None:
     ratios = []
-    for seed in range(32):
+    for seed in range(24):
         rng = np.random.default_rng([seed, KINDS.index(kind)])
         epsilon = (0.5, 0.3, 0.1, 0.05)[seed % 4]
         target = rng.uniform(-10, 10, 2)
@@ -120,12 +120,12 @@ def test_at_most_a_tenth_too_large(kind: str) -> None:
             held.measure(anchor, z, epsilon)
             assert held.contains(target), (seed, k)
             rings.append((anchor, max(0.0, z - epsilon - 1e-6), z + epsilon + 1e-6))
-            if k in (5, 7, 10, 15, 20, 30, 40):
+            if k in (5, 10, 20, 40):
                 truth = exact_area(rings, held.centroid)
                 # Of less than (30 µm)² neither the polygons nor the arcs are right to a tenth.
                 if truth > 1e-9:
                     ratios.append((held.area_m2 / truth, seed, k))
-    assert len(ratios) > 60
+    assert len(ratios) > 40
     # The arcs themselves are right to a thousandth.
     assert min(ratios)[0] > 0.999, min(ratios)
     assert max(ratios)[0] <= 1.1, max(ratios)
