@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from planning.adjacency_path import AdjacencyPaths
+    from planning.certificate import Certificate, certify
     from planning.compiled_map import CompiledMap
     from planning.decomposition import Cells, decompose
     from planning.deployment import Deployment
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from planning.edge_weights import virtual_weights
     from planning.environment import Environment
     from planning.geodesic import GeodesicMap
+    from planning.motion_plan import Schedule, TimedPath
     from planning.mutual_visibility import mutual_visibility
     from planning.physical_weights import (
         adjacency_path_weights,
@@ -36,6 +38,7 @@ if TYPE_CHECKING:
 __all__ = [
     "AdjacencyPaths",
     "Cells",
+    "Certificate",
     "CompiledMap",
     "Deployment",
     "DeploymentSequence",
@@ -43,10 +46,13 @@ __all__ = [
     "GeodesicMap",
     "PlacementGraph",
     "Redeployment",
+    "Schedule",
+    "TimedPath",
     "Tree",
     "adjacency_path_weights",
     "arrival_times",
     "bounded_weights",
+    "certify",
     "decompose",
     "euclidean_weights",
     "geodesic_weights",
@@ -61,6 +67,7 @@ __all__ = [
 _HOMES = {
     "AdjacencyPaths": "planning.adjacency_path",
     "Cells": "planning.decomposition",
+    "Certificate": "planning.certificate",
     "CompiledMap": "planning.compiled_map",
     "Deployment": "planning.deployment",
     "DeploymentSequence": "planning.deployment_sequence",
@@ -68,10 +75,13 @@ _HOMES = {
     "GeodesicMap": "planning.geodesic",
     "PlacementGraph": "planning.placement_graph",
     "Redeployment": "planning.redeployment",
+    "Schedule": "planning.motion_plan",
+    "TimedPath": "planning.motion_plan",
     "Tree": "planning.tree",
     "adjacency_path_weights": "planning.physical_weights",
     "arrival_times": "planning.physical_weights",
     "bounded_weights": "planning.physical_weights",
+    "certify": "planning.certificate",
     "decompose": "planning.decomposition",
     "euclidean_weights": "planning.physical_weights",
     "geodesic_weights": "planning.physical_weights",

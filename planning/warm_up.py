@@ -7,6 +7,7 @@ import numpy as np
 
 def exercise() -> None:
     """Plan in two rooms with a pillar."""
+    from planning.certificate import certify
     from planning.chain import cheapest_chain
     from planning.connectivity import connected
     from planning.coordination import bound_collisions, collision_boxes
@@ -16,7 +17,7 @@ def exercise() -> None:
     from planning.foresight import chain_holds
     from planning.geodesic import GeodesicMap
     from planning.grid_outline import outline
-    from planning.motion_plan import TimedPath
+    from planning.motion_plan import Schedule, TimedPath
     from planning.mutual_visibility import mutual_visibility
     from planning.ordered_chain import search_in_order
     from planning.placement import reachable_positions
@@ -47,6 +48,8 @@ def exercise() -> None:
     visible_intervals(rooms, points[:2], points[2:])
     visible_times(rooms, TimedPath(points[:2], [0.0, 1.0]), TimedPath.standing(points[2]))
     sees_throughout(rooms, points[:2], points[2:])
+    two = Schedule(["a", "b"], [TimedPath(points[:2], [0.0, 1.0]), TimedPath.standing(points[2])], 0.2)
+    certify(two, rooms)
     graph = PlacementGraph.from_points(rooms, 0.2, 2.0)
     graph.distances_from(points[0])
     _ = graph.distances
