@@ -18,7 +18,7 @@ from planning.deployment import TooFewRobots, identify_robots
 from planning.edge_modification import ROUNDING, best_modification
 from planning.known_topology import place_nodes
 from planning.min_plus import Links
-from planning.redeployment_bound import Counted, PriceAscent, count_nodes, name_nodes, relax
+from planning.redeployment_bound import Counted, PriceAscent, count_nodes, name_nodes, relax, without_rounding
 from planning.subset_programme import ROOT, PlacedTree
 from planning.tree import Floats, Ints
 
@@ -66,7 +66,7 @@ def search_with_bound(links: Links, move: Floats, ends: list[int], tree: Ints | 
             best = min(best, improve(links, move, ends, start), key=lambda found: found.cost)
         if not ascent.step(relaxation, best.cost):
             break
-    return Found(best.cost, min(ascent.bound, best.cost), best.edges, best.cells)
+    return Found(best.cost, without_rounding(ascent.bound, best.cost), best.edges, best.cells)
 
 
 def improve(links: Links, move: Floats, ends: list[int], tree: Ints) -> Found:

@@ -31,7 +31,7 @@ from planning.edge_modification import best_modification
 from planning.iterated_modification import search_with_bound
 from planning.known_topology import neighbours_of, place_nodes
 from planning.min_plus import Links, scaled_links
-from planning.redeployment_bound import bound_below, count_nodes, name_nodes, relax
+from planning.redeployment_bound import bound_below, count_nodes, name_nodes, relax, without_rounding
 from planning.subset_programme import ROOT
 from planning.tree import Floats, Ints, checked_weights
 
@@ -171,7 +171,7 @@ def _result(move: Floats, W: Floats, mu: float, placed: tuple[Ints, Ints] | None
     nodes = np.flatnonzero(cells >= 0)
     first, second = cells[tree].T
     cost = math.fsum((*move[nodes, cells[nodes]], *(mu * np.where(first == second, 0.0, W[first, second]))))
-    return Redeployment(cost, min(bound, cost), tree, cells)
+    return Redeployment(cost, cost if np.isinf(bound) else without_rounding(bound, cost), tree, cells)
 
 
 def _checked_costs(move: ArrayLike) -> Floats:
@@ -219,6 +219,7 @@ def _checked_tree(tree: ArrayLike, number: int, staying: list[int]) -> Ints:
         raise InvalidRedeployment(f"tree names node {outside[0]}, but nodes are 0 to {number - 1}")
     missing = sorted({*range(number)} - {*staying} - {*edges.ravel().tolist()})
     edges = np.concatenate((edges, np.array([(staying[0], i) for i in missing], dtype=np.int64).reshape(-1, 2)))
+    _check_edges(edges)
     neighbours = neighbours_of(edges, number)
     reached = [staying[0]]
     for i in reached:
@@ -233,6 +234,17 @@ def _checked_tree(tree: ArrayLike, number: int, staying: list[int]) -> Ints:
             f"tree has {len(edges)} edges between {number} nodes and so a cycle: a tree has {number - 1}"
         )
     return edges
+
+
+def _check_edges(edges: Ints) -> None:
+    """Refuse loops and edges that come twice: the count of edges would take them for what joins other nodes."""
+    met = set()
+    for i, j in edges.tolist():
+        if i == j:
+            raise InvalidRedeployment(f"tree joins node {i} to itself: leave that edge out")
+        if frozenset((i, j)) in met:
+            raise InvalidRedeployment(f"tree joins nodes {min(i, j)} and {max(i, j)} twice: leave one of the edges out")
+        met.add(frozenset((i, j)))
 
 
 def _whole_numbers(given: ArrayLike) -> Ints | None:

@@ -36,6 +36,9 @@ from planning.tree import Floats
 ROUNDING: Final = 1e-12
 """Relative: bounds are lowered by this, so that they hold in spite of rounding."""
 
+AGREEMENT: Final = 1e-9
+"""Relative: a bound and a cost that are added up in different orders differ by less."""
+
 PATIENCE: Final = 3
 """Steps without a better bound after which they become half as long."""
 
@@ -145,6 +148,11 @@ def _lowered(cost: float, prices: Floats) -> float:
     if np.isinf(cost):
         return np.inf
     return cost + float(prices.sum()) - ROUNDING * (abs(cost) + float(np.abs(prices).sum()))
+
+
+def without_rounding(bound: float, cost: float) -> float:
+    """The bound, or the cost of a tree where that is less by rounding. What is less by more contradicts the bound."""
+    return cost if cost < bound <= cost * (1.0 + AGREEMENT) else bound
 
 
 def name_nodes(move: Floats, counted: Counted, tree: PlacedTree) -> list[int]:

@@ -168,6 +168,10 @@ SQUARE = [(0, 1), (1, 2), (2, 3), (3, 0)]
         ({"tree": [(0, 1)]}, "node 2 is not joined to node 0: add an edge"),
         ({"tree": [(0, 1), (1, 2), (2, 0)]}, "tree has 3 edges between 3 nodes and so a cycle"),
         ({"tree": SQUARE, "move": np.zeros((4, 2))}, "tree has 4 edges between 4 nodes and so a cycle"),
+        ({"tree": [(0, 1), (0, 1)]}, "tree joins nodes 0 and 1 twice"),
+        ({"tree": [(0, 1), (1, 0), (1, 2)], "search": "fixed"}, "tree joins nodes 0 and 1 twice"),
+        ({"tree": [(0, 1), (2, 1), (1, 2)], "idle": True}, "tree joins nodes 1 and 2 twice"),
+        ({"tree": [(0, 1), (2, 2)]}, "tree joins node 2 to itself"),
         ({"tree": [(1, 2)], "idle": True, "search": "fixed"}, "node 1 is not joined to node 0"),
     ],
 )

@@ -15,7 +15,7 @@ from planning import redeploy
 from planning.iterated_modification import improve, search_with_bound
 from planning.min_plus import LANES, min_plus, scaled_links
 from planning.redeployment import EXACT_STATES
-from planning.redeployment_bound import PriceAscent, count_nodes, relax
+from planning.redeployment_bound import PriceAscent, count_nodes, relax, without_rounding
 from planning.subset_programme import solve_subsets, states_of
 from tests.planning.redeployment_oracles import (
     Case,
@@ -185,6 +185,13 @@ def test_prices_raise_the_bound() -> None:
         if not ascent.step(relax(links, case.move, counted, ascent.prices), best):
             break
     assert first + 0.1 * (best - first) < ascent.bound <= best
+
+
+def test_a_cost_below_the_bound_is_hidden_only_where_it_is_rounding() -> None:
+    assert without_rounding(3.0, 5.0) == 3.0
+    assert without_rounding(3.0 + 1e-12, 3.0) == 3.0
+    assert without_rounding(9.0, 3.0) == 9.0
+    assert without_rounding(inf, 3.0) == inf
 
 
 def test_a_local_optimum_is_one() -> None:
