@@ -37,6 +37,7 @@ VARIATIONS = {
     "μ = 1 m": Question(VARIED, mu_m=1.0),
     "μ = 25 m": Question(VARIED, mu_m=25.0),
     "agent goes where it sees": Question(VARIED, near=True),
+    "robots may idle": Question(VARIED, idle=True),
     "points instead of cells": Question(VARIED),
 }
 """As the question at this k but for what the name says."""

@@ -65,6 +65,13 @@ class Question:
     mu_m: float = MU_M
     near: bool = False
     """Agents go where they see from where they are, and not anywhere."""
+    idle: bool = False
+    """Robots that are not needed need not stay in the tree; before, they were all in it."""
+
+    @property
+    def ends(self) -> list[int]:
+        """Nodes that have to be in the tree."""
+        return list(range(1 + self.agents if self.idle else self.nodes))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -130,22 +137,21 @@ def draw_tasks(ground: PlacementGraph, question: Question, number: int, seed: in
             )
 
 
-def answer(task: Task, links: Links, priced: Floats) -> Answer:
+def answer(task: Task, ends: list[int], links: Links, priced: Floats) -> Answer:
     """Plan a redeployment by every search.
 
     Args:
         task: the redeployment.
+        ends: nodes that have to be in the tree.
         links: of the placements.
         priced: (N, N) float: μ W, which the links are made of.
     """
-    nodes = list(range(len(task.move)))
+    prices = np.zeros(len(task.move))
     searches: dict[str, Callable[[], float]] = {
-        "exact": lambda: (
-            relax(links, task.move, count_nodes(task.move, nodes, EXACT_STATES), np.zeros(len(nodes))).bound
-        ),
-        "one-edge": partial(_search_one_edge, task, links, priced, False),
-        "one-edge, repeated": partial(_search_one_edge, task, links, priced, True),
-        "fixed": lambda: _cost(task.move, priced, place_nodes(links, task.move, task.tree, nodes)),
+        "exact": lambda: relax(links, task.move, count_nodes(task.move, ends, EXACT_STATES), prices).bound,
+        "one-edge": partial(_search_one_edge, task, ends, links, priced, False),
+        "one-edge, repeated": partial(_search_one_edge, task, ends, links, priced, True),
+        "fixed": lambda: _cost(task.move, priced, place_nodes(links, task.move, task.tree, ends)),
     }
     costs, seconds = {}, {}
     for name, search in searches.items():
@@ -160,18 +166,17 @@ def answer_all(ground: PlacementGraph, question: Question, number: int, seed: in
     links = scaled_links(ground.weights, question.mu_m)
     priced = question.mu_m * ground.weights
     tasks = list(draw_tasks(ground, question, number, seed))
-    answer(tasks[0], links, priced)  # caches are cold
-    return [answer(task, links, priced) for task in tasks]
+    answer(tasks[0], question.ends, links, priced)  # caches are cold
+    return [answer(task, question.ends, links, priced) for task in tasks]
 
 
-def _search_one_edge(task: Task, links: Links, priced: Floats, repeated: bool) -> float:
+def _search_one_edge(task: Task, ends: list[int], links: Links, priced: Floats, repeated: bool) -> float:
     """Algorithm 7 from the present tree; repeated, until no modification is cheaper."""
-    nodes = list(range(len(task.move)))
-    cost, tree = best_modification(links, task.move, task.tree, nodes)
+    cost, tree = best_modification(links, task.move, task.tree, ends)
     while repeated:
-        better, tree = best_modification(links, task.move, tree, nodes)
+        better, tree = best_modification(links, task.move, tree, ends)
         repeated, cost = better < cost, better
-    return _cost(task.move, priced, place_nodes(links, task.move, tree, nodes))
+    return _cost(task.move, priced, place_nodes(links, task.move, tree, ends))
 
 
 def _cost(move: Floats, priced: Floats, placed: tuple[Ints, Ints] | None) -> float:
@@ -179,7 +184,8 @@ def _cost(move: Floats, priced: Floats, placed: tuple[Ints, Ints] | None) -> flo
     if placed is None:
         return np.inf
     tree, cells = placed
-    return float(move[np.arange(len(move)), cells].sum() + priced[cells[tree[:, 0]], cells[tree[:, 1]]].sum())
+    nodes = np.flatnonzero(cells >= 0)
+    return float(move[nodes, cells[nodes]].sum() + priced[cells[tree[:, 0]], cells[tree[:, 1]]].sum())
 
 
 def _terminals(places: Ints, move: Floats) -> Floats:

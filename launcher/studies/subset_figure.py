@@ -1,6 +1,6 @@
 """The picture of why the exact search is exact: how a tree is taken apart, and how much work that leaves.
 
-The letters are those of `planning.subset_programme`.
+The letters are those of `planning.subset_programme`, F(B, v) for F[B](v).
 """
 
 from __future__ import annotations
@@ -57,17 +57,17 @@ def _draw_branches(axes: Axes) -> None:
     _enclose(axes, (2, 6), REST, "B∖A", (1.08, -2.95))
     _draw_nodes(axes, {4: HELD, 1: BRANCH, 3: BRANCH, 5: BRANCH, 2: REST, 6: REST})
     axes.annotate("in v", (-0.3, 0.12), fontsize=10, ha="right", style="italic")
-    _say(axes, "F[B](v) = min over A of  h[A](v) + F[B∖A](v)")
+    _say(axes, "F(B, v) = min over A of  h(A, v) + F(B∖A, v)")
 
 
 def _draw_hanging(axes: Axes) -> None:
     axes.set_title("2. A branch is a tree with a root, hung by one edge", fontsize=10, loc="left")
-    _enclose(axes, (3, 5), BRANCH, "hangs below i in u:  F[A∖i](u)", (-2.45, -2.95))
+    _enclose(axes, (3, 5), BRANCH, "hangs below i in u:  F(A∖i, u)", (-2.45, -2.95))
     _draw_nodes(axes, {4: HELD, 1: BRANCH, 3: BRANCH, 5: BRANCH})
     axes.annotate("in v", (-0.3, 0.12), fontsize=10, ha="right", style="italic")
     axes.annotate("i, in u:  it pays C_i(u)", (-1.0, -1.15), fontsize=9, va="center", color=BRANCH)
     axes.annotate("μ W[u, v]", (-0.5, -0.75), fontsize=9, color=BRANCH)
-    _say(axes, "h[A](v) = min over u of  μ W[u, v] + min over i in A of  C_i(u) + F[A∖i](u)")
+    _say(axes, "h(A, v) = min over u of  μ W[u, v] + min over i in A of  C_i(u) + F(A∖i, u)")
 
 
 def _draw_work(axes: Axes) -> None:
