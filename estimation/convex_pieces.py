@@ -72,7 +72,7 @@ def cut(
     last = len(annuli) - 1
     # Pieces still to be cut wait at the end of out: at the annulus `stage`, with tolerances for the width `basis`.
     stage, basis = np.empty(MOST_PIECES, dtype=np.int64), np.empty(MOST_PIECES)
-    m, top, changed, telling = 0, MOST_PIECES - len(counts), False, False
+    m, top, changed, tells = 0, MOST_PIECES - len(counts), False, False
     coarse, before = False, np.inf
     for i in range(len(counts)):
         out[top + i, : counts[i]] = pieces[i, : counts[i]]
@@ -102,7 +102,7 @@ def cut(
                     at, wide, after = 0, now, now
                 ax, ay, r0, r1 = annuli[at]
                 nearest, farthest, inside = distances(P, n, ax, ay)
-                telling = telling or (at == last and (nearest < r0 or farthest > r1))
+                tells = tells or (at == last and (nearest < r0 or farthest > r1))
                 if nearest > r1 or farthest < r0:
                     n, changed = 0, True
                     break
@@ -130,7 +130,7 @@ def cut(
                 coarse = coarse or after == COARSE
                 kept[m], passed[m] = n, np.inf if after == COARSE else after
                 m += 1
-    return m, changed, telling
+    return m, changed, tells
 
 
 @kernel

@@ -1,13 +1,15 @@
 """One range, one prediction, one boundary, one decision: on runs of 40 ranges from a moving robot, ε = 0.5 m.
 
-Rows that begin with "·" are other people's estimators on the ranges of the rows above them.
+References are other people's estimators, told the same ranges; see `tests.benchmarks.estimation_references`.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from itertools import islice
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +23,8 @@ BOUND_M = 0.5
 RANGES = 40
 MOVED_M = 0.1
 
-Case = tuple[str, float, Callable[[], object]]
+Case = tuple[Any, ...]
+"""As in `tests.benchmarks.__main__`."""
 
 
 def ranges_of_a_walk(moved_m: float) -> Iterator[tuple[np.ndarray, float]]:
@@ -37,8 +40,8 @@ def ranges_of_a_walk(moved_m: float) -> Iterator[tuple[np.ndarray, float]]:
 
 
 def cases() -> Iterator[Case]:
-    """Name, target in seconds, what to time."""
-    run = list(islice(ranges_of_a_walk(0.0), RANGES))
+    """All cases of the estimation."""
+    run, walk = (list(islice(ranges_of_a_walk(moved_m), RANGES)) for moved_m in (0.0, MOVED_M))
 
     def told(kind: type[RangeFilter] | type[TightSet]) -> RangeFilter | TightSet:
         held = kind()
@@ -46,21 +49,22 @@ def cases() -> Iterator[Case]:
             held.measure(anchor, z, BOUND_M)
         return held
 
-    yield f"{RANGES} ranges into the ellipsoid", RANGES * 25e-6, lambda: told(RangeFilter)
-    yield f"{RANGES} ranges into the tight set", RANGES * 40e-6, lambda: told(TightSet)
-    # How many times faster the sets should be is nobody's promise: their own target is shown.
-    for name, reference in (
-        ("· filterpy, 1000 particles", particle_filter(run, BOUND_M, 1000)),
-        ("· filterpy, 5000 particles", particle_filter(run, BOUND_M, 5000)),
-        ("· codac, boxes of 0.1 m", paving(run, BOUND_M, 0.1)),
-    ):
-        if reference is not None:
-            yield name, RANGES * 40e-6, reference
-    for kind, name in ((RangeFilter, "ellipsoid"), (TightSet, "tight set")):
+    def follow(kind: type[RangeFilter] | type[TightSet]) -> None:
+        held = kind()
+        for anchor, z in walk:
+            held.predict(MOVED_M)
+            held.measure(anchor, z, BOUND_M)
+
+    standing = _present(
+        ("filterpy, 1000 particles", particle_filter(run, BOUND_M, 1000)),
+        ("filterpy, 5000 particles", particle_filter(run, BOUND_M, 5000)),
+        ("codac, boxes of 0.1 m", paving(run, BOUND_M, 0.1)),
+    )
+    walking = _present(("filterpy, 1000 particles", particle_filter(walk, BOUND_M, 1000, MOVED_M)))
+    for kind, name, range_s in ((RangeFilter, "ellipsoid", 25e-6), (TightSet, "tight set", 40e-6)):
+        yield f"{RANGES} ranges into the {name}", RANGES * range_s, partial(told, kind), *standing
+        yield f"{RANGES} predictions and ranges, {name}", RANGES * (60e-6 + range_s), partial(follow, kind), *walking
         yield f"prediction of the {name}", 60e-6, _follower(kind)
-    particles = particle_filter(list(islice(ranges_of_a_walk(MOVED_M), RANGES)), BOUND_M, 1000, MOVED_M)
-    if particles is not None:
-        yield f"· filterpy, 1000 particles, {RANGES} predictions and ranges", RANGES * 100e-6, particles
 
     early = RangeFilter()
     for anchor, z in run[:6]:
@@ -78,6 +82,11 @@ def cases() -> Iterator[Case]:
     yield "direction: 1 step ahead", 5e-3, lambda: look_ahead(tight, place, limits, 1)
     yield "direction: 5 steps ahead", 5e-3, lambda: look_ahead(tight, place, limits, 5)
     yield "direction: 5 steps ahead, after one range", 5e-3, lambda: look_ahead(wide, place, limits, 5)
+
+
+def _present(*references: tuple[str, Callable[[], object] | None]) -> tuple[Any, ...]:
+    """Names and works, one after the other, of the references that are there."""
+    return tuple(part for reference in references if reference[1] is not None for part in reference)
 
 
 def _follower(kind: type[RangeFilter] | type[TightSet]) -> Callable[[], float]:

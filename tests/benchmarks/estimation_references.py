@@ -7,7 +7,6 @@ does not load, gives no row, and a line says so.
 from __future__ import annotations
 
 import importlib
-import math
 import sys
 from collections.abc import Callable, Sequence
 from types import ModuleType
@@ -59,13 +58,13 @@ def particle_filter(
     return follow
 
 
-def paving(heard: Heard, bound_m: float, finest_m: float) -> Callable[[], float] | None:
-    """The intersection of all rings, paved with boxes down to a size; returns the area of the paving, m²."""
+def paving(heard: Heard, bound_m: float, finest_m: float) -> Callable[[], object] | None:
+    """The intersection of all rings, paved with boxes down to a size."""
     codac = optional_module("codac")
     if codac is None:
         return None
 
-    def pave() -> float:
+    def pave() -> object:
         place, contractor = codac.VectorVar(2), None
         for anchor, z in heard:
             x, y = map(float, anchor)
@@ -74,7 +73,6 @@ def paving(heard: Heard, bound_m: float, finest_m: float) -> Callable[[], float]
             contractor = ring if contractor is None else contractor & ring
         (x, y), reach = map(float, heard[0][0]), heard[0][1] + bound_m
         box = codac.IntervalVector([[x - reach, x + reach], [y - reach, y + reach]])
-        paved = codac.pave(box, contractor, finest_m)
-        return math.fsum(part.volume() for part in paved.boxes(codac.PavingOut.outer))
+        return codac.pave(box, contractor, finest_m)
 
     return pave
