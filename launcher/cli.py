@@ -11,9 +11,11 @@ import typer
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from launcher.commands import live, map_facts, offline, plans, study
+from launcher.usage import PlainGroup
 
 app = typer.Typer(
     name="sightline",
+    cls=PlainGroup,
     help="A team of robots keeps an unbroken line-of-sight chain between a base station and a walking agent.",
     no_args_is_help=True,
     add_completion=False,

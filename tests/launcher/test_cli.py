@@ -54,6 +54,14 @@ def test_version() -> None:
     assert result.stdout.startswith("sightline 0.")
 
 
+@pytest.mark.parametrize("arguments", [[], ["study"]])
+def test_without_a_command_there_is_help(arguments: list[str]) -> None:
+    result = sightline(*arguments)
+    assert result.exit_code == 2
+    assert "--help" in result.stdout
+    assert result.stderr == ""
+
+
 def test_map_without_a_name_lists_all_maps() -> None:
     listed = sightline("map")
     assert listed.exit_code == 0
@@ -143,6 +151,26 @@ def test_plan_takes_negative_places_and_geojson(tmp_path: Path) -> None:
         (["goal", "-3,4"], ["there is no run in runs/", "sightline run"]),
         (["goal", "1,1", "--run", "absent"], ["absent is no run", "mission.json"]),
         (["review", "absent"], ["absent is no run", "mission.json"]),
+        (["simulate", "office", "--duration", "abc"], ["--duration 'abc' is no number", "simulate --help"]),
+        (["run", "office", "--duration", "abc"], ["--duration 'abc' is no number", "run --help"]),
+        (["demo", "--duration", ""], ["--duration '' is no number"]),
+        (["simulate", "office", "--seeds", "2.5"], ["--seeds '2.5' is no whole number"]),
+        (["map", "room1", "--radius", "wide"], ["--radius 'wide' is no number", "map --help"]),
+        (["plan", "room1", "--base", "5,10", "--agent", "8,10", "--mu", "\n"], [r"--mu '\n' is no number"]),
+        (["study", "localization", "--seeds", "1"], ["--seeds 1 is out of range", "from 2 to 1000"]),
+        (["study", "redeployment", "--seed", "-1"], ["--seed -1 is out of range", "at least 0"]),
+        (
+            ["plan", "room1", "--base", "5,10", "--agent", "8,10", "--method", "best"],
+            ["--method: 'best' is not one of 'exact', 'mst'", "give one of them"],
+        ),
+        (["plan"], ["plan needs MAP; see", "plan --help"]),
+        (["plan", "room1"], ["plan needs --base X,Y; see"]),
+        (["plan", "room1", "--base"], ["--base", "requires an argument; see"]),
+        (["plan", "room1", "room2", "--base", "5,10", "--agent", "8,10"], ["unexpected extra argument", "room2"]),
+        (["map", "--rdius", "1"], ["--rdius", "did you mean --radius?"]),
+        (["map", "--json=yes"], ["'--json' does not take a value; see"]),
+        (["goal"], ["goal needs X,Y; see"]),
+        (["plam"], ["no such command 'plam'; did you mean 'plan'?"]),
     ],
 )
 def test_a_refusal_is_one_sentence(
