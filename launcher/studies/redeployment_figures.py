@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from launcher.studies import drawing
+from launcher.studies.map_drawing import draw_walls
 from launcher.studies.redeployment_runs import SEARCHES, Answer, Question, Task
-from planning import Environment, PlacementGraph, Redeployment, redeploy
+from planning import PlacementGraph, Redeployment, redeploy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -84,14 +85,6 @@ def draw_example(ground: PlacementGraph, task: Task, question: Question, file: P
         )
     drawing.legend_below(figure, 5)
     drawing.write_figure(figure, file)
-
-
-def draw_walls(axes: Axes, environment: Environment) -> None:
-    """The walls of a map, free space white."""
-    axes.set_facecolor("#eceff1")
-    axes.fill(*environment.outer.T, facecolor="white", edgecolor=drawing.INK, linewidth=0.8, zorder=0)
-    for hole in environment.holes:
-        axes.fill(*hole.T, facecolor="#eceff1", edgecolor=drawing.INK, linewidth=0.8, zorder=1)
 
 
 def _draw_redeployment(axes: Axes, ground: PlacementGraph, task: Task, found: Redeployment) -> float:

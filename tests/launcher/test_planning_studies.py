@@ -29,7 +29,8 @@ from launcher.studies.redeployment_runs import (
 from launcher.studies.scaling import fit_exponential, fit_power
 from launcher.studies.subset_figure import count_work
 from launcher.studies.thesis_tables import EXPONENTIAL_AREA, ROWS
-from launcher.studies.weights import find_scale, study_weights
+from launcher.studies.weighed_edges import find_scale
+from launcher.studies.weights import study_weights
 from planning import Environment, decompose, mutual_visibility, redeploy
 from planning.edge_modification import best_modification
 from planning.min_plus import scaled_links
