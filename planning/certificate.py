@@ -13,8 +13,9 @@ Sight is closed: a line that grazes a wall holds. Everything is judged in free s
 dip, and discs may overlap by as much: so no rounding of theirs makes a refusal. What is nearer to the limit than an
 eighth of that depth is refused. Speeds may be too high by 10⁻⁹ of them.
 
-It says nothing of members whose future is not planned: leave an independent agent out, and certify the chain to its
-last relay. Members advance by this one clock; who waits for whom when one is late is not part of a schedule.
+Where a member goes into a wall nothing is said of what it sees there. Nothing is said either of members whose future is
+not planned: leave an independent agent out, and certify the chain to its last relay. Members advance by this one clock;
+who waits for whom when one is late is not part of a schedule.
 
 The code shares nothing with planners but the values in `planning.motion_plan`: bounds over intervals of time that are
 halved (`planning.certificate_sight`) and convex distances (`planning.certificate_clearance`). Beyond the thesis, which
@@ -33,16 +34,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from planning.certificate_clearance import find_collisions, find_contacts, inside_rings
 from planning.certificate_motion import join_motions
+from planning.certificate_network import Break, find_breaks, find_gaps
 from planning.certificate_sight import recede_walls, watch
-from planning.kernel import kernel
 from planning.motion_plan import InvalidSchedule, Schedule, TimedPath
 
 if TYPE_CHECKING:
     from planning.environment import Environment
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 Motions = dict[tuple[int, int], tuple[Floats, Floats, Floats]]
 Kind = Literal["wall", "collision", "speed", "connection"]
 
@@ -104,7 +103,7 @@ def certify(
             Without ``links`` and ``ends`` the whole team must be one network.
 
     Raises:
-        InvalidSchedule: a link or end is no member, or radii or speeds do not fit.
+        InvalidSchedule: a link or the ends are not two members, or radii or speeds do not fit.
 
     Complexity: O(k² (m + w) + k m w) for k members, m waypoints each and w walls where intervals of time need few
         halvings, which is bounded for each piece of motion.
@@ -135,6 +134,8 @@ def _find_pair(schedule: Schedule, names: tuple[str, str]) -> tuple[int, int]:
         if name not in schedule.members:
             raise InvalidSchedule(f"'{name}' is no member of the schedule: it has {', '.join(schedule.members)}")
     i, j = sorted(schedule.members.index(name) for name in names)
+    if i == j:
+        raise InvalidSchedule(f"'{names[0]}' is asked to be joined to itself: name two different members")
     return i, j
 
 
@@ -238,93 +239,26 @@ def _check_connection(
         pair: watch(*motion, walls, depth) for pair, motion in motions.items() if network or pair in (required or ())
     }
     for i, j in sorted(required or ()):
-        for start, end in _find_gaps(schedule, sight[i, j]):
+        for start, end in find_gaps(sight[i, j], schedule.start_s, schedule.end_s):
             one, other = schedule.members[i], schedule.members[j]
             text = f"{one} and {other} do not see each other from {start:.6g} s on"
             found.append(Violation(start, _until(schedule, end), "connection", (one, other), text))
     if network:
-        found += _find_breaks(schedule, sight, ends)
-    return found
-
-
-def _find_gaps(schedule: Schedule, intervals: Floats) -> list[tuple[float, float]]:
-    """The times of a schedule outside of closed intervals (n, 2), which are in order."""
-    edges = np.concatenate([[schedule.start_s], intervals.ravel(), [schedule.end_s]]).reshape(-1, 2)
-    gaps = [(float(start), float(end)) for start, end in edges if start < end]
-    return gaps if gaps or len(intervals) else [(schedule.start_s, schedule.end_s)]
-
-
-def _find_breaks(
-    schedule: Schedule, sight: dict[tuple[int, int], Floats], ends: tuple[int, int] | None
-) -> list[Violation]:
-    """Where the network of sight does not join the ends, or the team if there are none.
-
-    Between two neighbouring beginnings and ends of sight the links stay the same; at such an instant itself, for sight
-    is closed, there are those of both neighbours. So it is enough to look between.
-    """
-    edges = [schedule.start_s, schedule.end_s]
-    times = np.unique(np.concatenate([edges, *(intervals.ravel() for intervals in sight.values())]))
-    if len(times) == 1:
-        times = np.repeat(times, 2)
-    pairs = np.array(list(sight), dtype=np.int64).reshape(-1, 2)
-    held = np.zeros((len(pairs), len(times) - 1), dtype=np.bool_)
-    for row, intervals in zip(held, sight.values(), strict=True):
-        for start, end in np.searchsorted(times, intervals):
-            row[start:end] = True
-        if schedule.start_s == schedule.end_s:
-            row[:] = len(intervals) > 0
-    labels = _label_parts(held, pairs, len(schedule))
-    joined = np.all(labels == 0, axis=1) if ends is None else labels[:, ends[0]] == labels[:, ends[1]]
-    found = []
-    for first in np.flatnonzero(~joined & np.append(True, joined[:-1])):
-        last = first + int(np.argmax(np.append(joined[first:], True)))
-        lost = [
-            (int(i), int(j))
-            for (i, j), row in zip(pairs, held, strict=True)
-            if first > 0 and row[first - 1] and labels[first, i] != labels[first, j]
+        found += [
+            Violation(gap.start_s, _until(schedule, gap.end_s), "connection", *_name_parts(schedule, gap))
+            for gap in find_breaks(sight, len(schedule), schedule.start_s, schedule.end_s, ends)
         ]
-        i, j = ends or (lost[0] if lost else (0, int(np.argmax(labels[first] > 0))))
-        found.append(_describe_break(schedule, labels[first], (i, j), lost, float(times[first]), float(times[last])))
     return found
 
 
-def _describe_break(
-    schedule: Schedule, labels: Ints, pair: tuple[int, int], lost: list[tuple[int, int]], start: float, end: float
-) -> Violation:
+def _name_parts(schedule: Schedule, gap: Break) -> tuple[tuple[str, str], str]:
+    """Two members that part, and the sentence about it."""
+    names = schedule.members
     parts = [
-        " + ".join(name for name, label in zip(schedule.members, labels, strict=True) if label == part)
-        for part in range(labels.max() + 1)
+        " + ".join(name for name, label in zip(names, gap.parts, strict=True) if label == part)
+        for part in range(max(gap.parts) + 1)
     ]
-    names = [" and ".join((schedule.members[i], schedule.members[j])) for i, j in lost]
-    why = f"as {', '.join(names)} lose sight of each other, " if names else ""
-    text = f"{why}the team is parted from {start:.6g} s on: {' | '.join(parts)}"
-    members = (schedule.members[pair[0]], schedule.members[pair[1]])
-    return Violation(start, _until(schedule, end), "connection", members, text)
-
-
-@kernel
-def _label_parts(held: Bools, pairs: Ints, members: int) -> Ints:
-    """The part of the network that each member is in, numbered by its lowest member: (pieces, members).
-
-    ``held`` (n, pieces) bool: which of the n ``pairs`` see each other in each piece of time.
-    """
-    pieces = held.shape[1]
-    labels = np.empty((pieces, members), np.int64)
-    for t in range(pieces):
-        root = np.arange(members)
-        for k in range(pairs.shape[0]):
-            if held[k, t]:
-                low, high = root[pairs[k, 0]], root[pairs[k, 1]]
-                if low != high:
-                    low, high = min(low, high), max(low, high)
-                    for i in range(members):
-                        if root[i] == high:
-                            root[i] = low
-        parts = 0
-        for i in range(members):
-            if root[i] == i:
-                labels[t, i] = parts
-                parts += 1
-            else:
-                labels[t, i] = labels[t, root[i]]
-    return labels
+    lost = ", ".join(f"{names[i]} and {names[j]}" for i, j in gap.lost)
+    why = f"as {lost} lose sight of each other, " if lost else ""
+    i, j = gap.between
+    return (names[i], names[j]), f"{why}the team is parted from {gap.start_s:.6g} s on: {' | '.join(parts)}"

@@ -78,6 +78,12 @@ def _crosses(
 
 
 @kernel
+def _date(share: float, start: float, end: float) -> float:
+    """The time at a share of a piece of time: its end exactly at 1, so that pieces join."""
+    return end if share == 1.0 else start + share * (end - start)
+
+
+@kernel
 def find_contacts(times: Floats, points: Floats, walls: Floats, reach: float) -> Floats:
     """When a member is too near to walls.
 
@@ -115,8 +121,7 @@ def find_contacts(times: Floats, points: Floats, walls: Floats, reach: float) ->
                 longer = np.empty((2 * n, 4))
                 longer[:n] = contacts
                 contacts = longer
-            contacts[n, 0] = times[i] + first * (times[j] - times[i])
-            contacts[n, 1] = times[i] + last * (times[j] - times[i])
+            contacts[n, 0], contacts[n, 1] = _date(first, times[i], times[j]), _date(last, times[i], times[j])
             contacts[n, 2], contacts[n, 3] = px + first * ux, py + first * uy
             n += 1
     return contacts[:n].copy()
@@ -145,7 +150,6 @@ def find_collisions(times: Floats, p: Floats, q: Floats, reach: float) -> Floats
         if _distance_to_segment(0.0, 0.0, dx, dy, ex, ey) >= reach:
             continue
         first, last = _too_near(dx, dy, ex - dx, ey - dy, 0.0, 0.0, 0.0, 0.0, reach)
-        found[n, 0] = times[i] + first * (times[i + 1] - times[i])
-        found[n, 1] = times[i] + last * (times[i + 1] - times[i])
+        found[n, 0], found[n, 1] = _date(first, times[i], times[i + 1]), _date(last, times[i], times[i + 1])
         n += 1
     return found[:n].copy()

@@ -44,7 +44,6 @@ def recede_walls(walls: Floats, successors: Ints, depth_m: float) -> Floats:
     """
     along = walls[:, 1] - walls[:, 0]
     normals = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.linalg.norm(along, axis=1, keepdims=True)
-    ends = np.empty_like(normals)
     sums = normals + normals[successors]
     squares = 0.5 * np.einsum("ij,ij->i", sums, sums)
     # A corner so sharp that its mitre cannot be computed stays where it is: that is the strict side.

@@ -193,6 +193,8 @@ def test_what_is_no_member_is_refused() -> None:
     schedule = team(TimedPath.standing((1, 1)))
     with pytest.raises(InvalidSchedule, match="'base' is no member of the schedule: it has robot_0"):
         certify(schedule, ROOM, links=[("robot_0", "base")])
+    with pytest.raises(InvalidSchedule, match="'robot_0' is asked to be joined to itself"):
+        certify(schedule, ROOM, ends=("robot_0", "robot_0"))
     with pytest.raises(InvalidSchedule, match="radius"):
         certify(schedule, ROOM, -1.0)
 
