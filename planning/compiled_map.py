@@ -26,7 +26,7 @@ from planning.geodesic import GeodesicMap
 from planning.geodesic_table import GeodesicTable
 from planning.map_cache import Arrays, digest, fetch
 from planning.mutual_visibility import mutual_visibility
-from planning.placement_graph import PlacementGraph
+from planning.placement_graph import NoPlacement, PlacementGraph
 from planning.placement_sight import CellSight, PointSight
 from planning.shortest_paths import all_pairs
 
@@ -53,6 +53,10 @@ class CompiledMap:
     """Of the robots, metres."""
     max_bitangent_m: float | None = None
     """As in `decompose`."""
+    least_area_m2: float = 0.0
+    """Smaller cells are no placements. They stay cells that an agent can be in, so nothing of the map is lost, but
+    chains may take more relays.
+    """
     containing: tuple[float, float] | None = None
     """Robots are in the part of the free space at this point, metres, as in `Environment.inflated`."""
     announce: Callable[[str], None] = _say_nothing
@@ -120,15 +124,25 @@ class CompiledMap:
 
     @cached_property
     def cell_placements(self) -> PlacementGraph:
-        """`PlacementGraph.from_cells` of these cells, with the virtual weights."""
+        """`PlacementGraph.from_cells` of these cells, with the virtual weights, less the smallest.
+
+        Raises:
+            NoPlacement: no cell is large enough, or none can be stood in.
+        """
 
         def compute() -> Arrays:
             graph = PlacementGraph.from_cells(
                 self.cells, self.seen, self.environment, self.radius_m, weights=self.weights, containing=self.containing
             )
-            return {"positions": graph.positions, "cells": graph.cells}
+            kept = self.cells.areas[graph.cells] >= self.least_area_m2
+            if not kept.any():
+                name, least = self.environment.name, f"{self.least_area_m2:g} m²"
+                raise NoPlacement(
+                    f"the map {name!r} has no cell of {least} for a robot to stand in: allow smaller ones"
+                )
+            return {"positions": graph.positions[kept], "cells": graph.cells[kept]}
 
-        arrays = self._fetch("standing", digest(self._cells_key, self._free_key), compute)
+        arrays = self._fetch("standing", digest(self._cells_key, self._free_key, self.least_area_m2), compute)
         positions, kept = arrays["positions"], arrays["cells"]
         weights = np.ascontiguousarray(self.weights[np.ix_(kept, kept)])
         sight = CellSight(self.cells, self.weights, kept)

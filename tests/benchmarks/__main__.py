@@ -12,19 +12,14 @@ import json
 import os
 import statistics
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
+
+from tests.benchmarks.timing import Case, Work
 
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
     os.environ.setdefault(name, "1")
-
-Work: TypeAlias = Callable[[], object]
-"""What is timed; if it returns a float, that is the time that counts, in seconds: of a part of itself, or scaled up."""
-
-Case: TypeAlias = tuple[Any, ...]
-"""Name (str), target in seconds (float), work (`Work`); then any number of references, each a name (str) and a `Work`, or
-seconds (float) that somebody published."""
 
 
 def cases() -> Iterator[Case]:

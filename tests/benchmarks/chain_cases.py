@@ -6,7 +6,7 @@ where matters.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
@@ -19,9 +19,9 @@ from planning.edge_weights import virtual_weights
 from planning.environment import Environment
 from planning.geodesic import GeodesicMap
 from planning.mutual_visibility import mutual_visibility
+from tests.benchmarks.timing import Case, seconds_of
 
 Floats = NDArray[np.float64]
-Case = tuple[str, float, Callable[[], object]] | tuple[str, float, Callable[[], object], str, Callable[[], object]]
 
 POINTS = 240
 RELAY_M = 1.5
@@ -44,7 +44,7 @@ def cases() -> Iterator[Case]:
             asked = _ask(geodesics, places, METRES_PER_WEIGHT * weights, robots)
             name = f"chain by subsets, {robots} robots, {len(places)} {what}"
             if robots <= 6:
-                yield name, target_s, partial(cheapest_chain, *asked), "numpy", partial(least_cost, *asked)
+                yield name, target_s, partial(cheapest_chain, *asked), "numpy", partial(seconds_of, least_cost, *asked)
             else:
                 yield name, target_s, partial(cheapest_chain, *asked)
 

@@ -28,7 +28,7 @@ from planning.edge_weights import virtual_weights
 from planning.environment import Environment
 from planning.mutual_visibility import mutual_visibility
 from planning.shortest_paths import all_pairs
-from tests.benchmarks.__main__ import Case, Work
+from tests.benchmarks.timing import Case, Work
 
 Floats = NDArray[np.float64]
 

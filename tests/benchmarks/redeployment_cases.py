@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
 
 import maps
 from planning import Environment, decompose, mutual_visibility, redeploy, virtual_weights
+from tests.benchmarks.timing import Case, seconds_of
 from tests.planning.redeployment_oracles import naive_one_edge
-
-Case = tuple[str, float, Callable[[], object]] | tuple[str, float, Callable[[], object], str, Callable[[], object]]
 
 MU = 5.0
 """Metres that a robot moves for one unit of virtual weight."""
@@ -41,7 +40,7 @@ def cases() -> Iterator[Case]:
             target_s,
             partial(redeploy, move, W, MU, "one-edge", line),
             "algorithm 7 in numpy",
-            partial(naive_one_edge, move, W, MU, line),
+            partial(seconds_of, naive_one_edge, move, W, MU, line),
         )
     for k, target_s in ((6, 0.020), (8, 0.080), (10, 0.400)):
         move, W = instance(k, 638)

@@ -16,7 +16,7 @@ from planning.edge_weights import virtual_weights
 from planning.environment import Environment
 from planning.geodesic import GeodesicMap
 from planning.mutual_visibility import TooManyCells, mutual_visibility
-from planning.placement_graph import PlacementGraph
+from planning.placement_graph import NoPlacement, PlacementGraph
 from planning.shortest_paths import all_pairs
 from tests.planning.polygons import free_points
 
@@ -168,3 +168,18 @@ def test_parts_raise_what_their_makers_raise(monkeypatch: pytest.MonkeyPatch) ->
             _ = compiled.seen
     with pytest.raises(ValueError, match="max_bitangent_m"):
         _ = CompiledMap(compiled.environment, "aspect", max_bitangent_m=-1.0).cells
+
+
+def test_small_cells_are_no_placements_but_an_agent_can_be_in_them() -> None:
+    environment = Environment.load(maps.path("room2"))
+    every = CompiledMap(environment, "aspect", 0.2).cell_placements
+    compiled = CompiledMap(environment, "aspect", 0.2, least_area_m2=1.0)
+    large, cells = compiled.cell_placements, compiled.cells
+    assert large.cells.tolist() == [cell for cell in every.cells if cells.areas[cell] >= 1.0]
+    np.testing.assert_array_equal(large.positions, every.positions[np.isin(every.cells, large.cells)])
+    np.testing.assert_array_equal(large.visible, compiled.seen.toarray()[np.ix_(large.cells, large.cells)])
+    small = np.flatnonzero(cells.areas < 1.0)
+    assert len(small) > 20
+    assert all(large.sees(cells.centroids[cell]).any() for cell in small)
+    with pytest.raises(NoPlacement, match="no cell of 1e\\+06 m²"):
+        _ = CompiledMap(environment, "aspect", 0.2, least_area_m2=1e6).cell_placements
