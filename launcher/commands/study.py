@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
 from launcher.console import plainly, tell
+from launcher.scenario import ScenarioFault
 
 app = typer.Typer(no_args_is_help=True, help="Run an experiment; leave figures, and the CSV files they are drawn from.")
 
@@ -21,14 +24,10 @@ def localization(
 ) -> None:
     """Robots find a target by ranges and choose where to go: thesis chapter 2, figures 10 and 12 to 18."""
     with plainly():
-        from launcher.kernels import warm_up
+        folder = _made(output, "localization", "estimation")
         from launcher.studies.localization import study_localization
 
-        warm_up(tell, ["estimation"])
-        folder = _made(output, "localization")
-        text = study_localization(folder, seeds, tell)
-        tell(text)
-        tell(f"Figures, tables and summary.md: {folder}")
+        _conclude(study_localization(folder, seeds, tell), folder)
 
 
 @app.command()
@@ -47,19 +46,17 @@ def ranges(
 ) -> None:
     """Localise the beacons, or the moving node, of a data set from its ranges alone."""
     with plainly():
-        from launcher.kernels import warm_up
         from launcher.studies.range_data import read_range_data
+
+        known = read_range_data(data)
+        folder = _made(output, f"ranges-{data.resolve().name}-{find}", "estimation")
         from launcher.studies.ranges import study_beacons, study_target
 
-        warm_up(tell, ["estimation"])
-        folder = output or _default(f"ranges-{data.resolve().name}-{find}")
-        known = read_range_data(data)
         if find == "beacons":
             text = study_beacons(folder, known, bound_m, tell)
         else:
             text = study_target(folder, known, speed_m_s, bound_m, tell)
-        tell(text.rstrip())
-        tell(f"Figure and tables: {folder}")
+        _conclude(text, folder)
 
 
 @app.command()
@@ -69,13 +66,10 @@ def complexity(
 ) -> None:
     """Count cells and time every planning algorithm: thesis §4.1, Tables 1 to 3 and figures 41 to 50."""
     with plainly():
-        from launcher.kernels import warm_up
+        folder = _made(output, "complexity", "planning")
         from launcher.studies.complexity import study_complexity
 
-        warm_up(tell, ["planning"])
-        folder = _made(output, "complexity")
-        tell(study_complexity(folder, quick, tell))
-        tell(f"Figures, tables and summary.md: {folder}")
+        _conclude(study_complexity(folder, quick, tell), folder)
 
 
 @app.command()
@@ -87,13 +81,10 @@ def weights(
 ) -> None:
     """Weigh the edges of the mutual visibility graphs: thesis §3.3.1, figures 25 to 30."""
     with plainly():
-        from launcher.kernels import warm_up
+        folder = _made(output, "weights", "planning")
         from launcher.studies.weights import study_weights
 
-        warm_up(tell, ["planning"])
-        folder = _made(output, "weights")
-        tell(study_weights(folder, shown, tell))
-        tell(f"Figures, tables and summary.md: {folder}")
+        _conclude(study_weights(folder, shown, tell), folder)
 
 
 @app.command()
@@ -104,21 +95,33 @@ def redeployment(
 ) -> None:
     """How much the optimum over all trees saves beside searches near the present tree, on the thesis' maps."""
     with plainly():
-        from launcher.kernels import warm_up
+        folder = _made(output, "redeployment", "planning")
         from launcher.studies.redeployment import study_redeployment
 
-        warm_up(tell, ["planning"])
-        folder = _made(output, "redeployment")
-        tell(study_redeployment(folder, number, seed, tell=tell))
-        tell(f"Figures, tables and summary.md: {folder}")
+        _conclude(study_redeployment(folder, number, seed, tell=tell), folder)
 
 
-def _made(output: Path | None, name: str) -> Path:
-    """The folder to write to; a folder that cannot be made costs no time."""
-    folder = output or _default(name)
-    folder.mkdir(parents=True, exist_ok=True)
+def _made(output: Path | None, name: str, package: Literal["planning", "estimation"]) -> Path:
+    """The folder to write to, made before any work is done for it; then the package's kernels.
+
+    Raises:
+        ScenarioFault: one sentence, where nothing can be written there.
+    """
+    folder = output or Path("runs") / "studies" / name
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        raise ScenarioFault(
+            f"--output {folder}: cannot be made a folder ({problem.strerror}); name one that you may write to"
+        ) from None
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise ScenarioFault(f"--output {folder}: you may not write to that folder; name another")
+    from launcher.kernels import warm_up
+
+    warm_up(tell, [package])
     return folder
 
 
-def _default(name: str) -> Path:
-    return Path("runs") / "studies" / name
+def _conclude(text: str, folder: Path) -> None:
+    tell(text.rstrip())
+    tell(f"Figures and tables: {folder}")

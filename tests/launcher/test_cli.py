@@ -197,3 +197,13 @@ def test_simulate_prints_figures_and_json_the_same_twice(scenario: Path, tmp_pat
 def test_simulate_refuses_what_cannot_be_run(scenario: Path) -> None:
     scenario.write_text(SCENARIO.replace("[5.0, 10.0]", "[0.0, 0.0]"))
     assert f"{scenario}: base.position [0, 0] is inside a wall" in refusal("simulate", str(scenario))
+
+
+@pytest.mark.parametrize("study", [["complexity"], ["weights"], ["redeployment"], ["localization"]])
+def test_studies_refuse_a_folder_that_cannot_be_made_before_they_work(study: list[str], tmp_path: Path) -> None:
+    file = tmp_path / "notes.txt"
+    file.write_text("not a folder")
+    for output in (file, file / "below"):
+        said = refusal("study", *study, "--output", str(output))
+        assert f"--output {output}: cannot be made a folder" in said
+        assert "name one that you may write to" in said
