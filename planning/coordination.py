@@ -46,7 +46,8 @@ def bound_collisions(segments_i: ArrayLike, segments_j: ArrayLike, separation_m:
 
     Complexity: O(n). Thesis algorithm 9 (COLLISIONBOUND), corrected.
     """
-    i, j = (np.array(segments, dtype=np.float64, order="C").reshape(-1, 2, 2) for segments in (segments_i, segments_j))
+    i, j = (_read_points(segments).reshape(-1, 2, 2) for segments in (segments_i, segments_j))
+    _check_separation(separation_m)
     if len(i) != len(j):
         raise ValueError(f"collisions of {len(i)} segments with {len(j)}: give as many, row by row they are pairs")
     found: Floats = _bound_pairs(i, j, separation_m)
@@ -65,7 +66,7 @@ def collision_sections(segment_i: ArrayLike, segment_j: ArrayLike, separation_m:
     Returns:
         (n, 2) float: least and greatest κ_i, NaN where nothing collides. O(n).
     """
-    i, j = (np.array(segment, dtype=np.float64).reshape(2, 2) for segment in (segment_i, segment_j))
+    i, j = _read_points(segment_i), _read_points(segment_j)
     places = j[0] + np.asarray(shares_j, dtype=np.float64)[:, None] * (j[1] - j[0])
     still = np.repeat(places[:, None], 2, axis=1)
     return bound_collisions(np.broadcast_to(i, still.shape), still, separation_m)[:, :2]
@@ -87,16 +88,30 @@ def collision_boxes(path_i: ArrayLike, path_j: ArrayLike, separation_m: float) -
 
     Complexity: O(m n); only pairs of segments that come near each other cost more than a comparison.
     """
-    i, j = (np.array(path, dtype=np.float64, order="C").reshape(-1, 2) for path in (path_i, path_j))
-    boxes, segments = _bound_paths(_stretch(i), _stretch(j), separation_m)
+    _check_separation(separation_m)
+    boxes, segments = _bound_paths(_read_path(path_i), _read_path(path_j), separation_m)
     return boxes, segments
 
 
-def _stretch(path: Floats) -> Floats:
+def _check_separation(separation_m: float) -> None:
+    if not separation_m >= 0.0:
+        raise ValueError(f"the separation of two robots is {separation_m} m: give the sum of their radii")
+
+
+def _read_points(points: ArrayLike) -> Floats:
+    read = np.array(points, dtype=np.float64, order="C").reshape(-1, 2)
+    # A box that is missing would be a collision, so nothing may be lost in comparisons with what is no number.
+    if not np.isfinite(read).all():
+        raise ValueError("a path has a point that is not finite: give metres")
+    return read
+
+
+def _read_path(path: ArrayLike) -> Floats:
     """A single point as a segment of no length, so that every path has segments."""
-    if len(path) == 0:
+    points = _read_points(path)
+    if len(points) == 0:
         raise ValueError("a path has no points: give at least the place where the robot stands")
-    return np.repeat(path, 2, axis=0) if len(path) == 1 else path
+    return np.repeat(points, 2, axis=0) if len(points) == 1 else points
 
 
 @kernel

@@ -34,7 +34,7 @@ def test_breaks_are_those_of_the_graphs_between_all_changes(seed: int, members: 
         assert len(current) == (0 if joined else 1)
         for gap in current:
             if time == gap.start_s + 0.5:
-                parts = {i: part for i, part in enumerate(gap.parts)}
+                parts = dict(enumerate(gap.parts))
                 expected = {frozenset(part) for part in nx.connected_components(graph)}
                 assert {frozenset(i for i in parts if parts[i] == part) for part in parts.values()} == expected
                 assert parts[gap.between[0]] != parts[gap.between[1]]

@@ -228,5 +228,9 @@ def test_a_robot_that_stands_has_a_path_of_one_point() -> None:
 def test_what_is_no_pair_is_refused() -> None:
     with pytest.raises(ValueError, match="2 segments with 1"):
         bound_collisions(np.zeros((2, 2, 2)), np.zeros((1, 2, 2)), 0.4)
+    with pytest.raises(ValueError, match="separation of two robots is nan"):
+        bound_collisions(np.zeros((1, 2, 2)), np.zeros((1, 2, 2)), np.nan)
+    with pytest.raises(ValueError, match="not finite"):
+        collision_boxes([(0, 0), (np.inf, 0)], [(0, 0)], 0.4)
     with pytest.raises(ValueError, match="no points"):
         collision_boxes(np.zeros((0, 2)), [(0, 0)], 0.4)
