@@ -9,6 +9,11 @@ W are the virtual weights of the placements' links (thesis eq. 25–26). The sea
 robots, ``"one-edge"`` and ``"fixed"`` (thesis §3.5–3.6) stay within one edge of the team's tree, or keep it. That tree
 is the standing chain, and the spares hang on the agent, whom they follow: so one edge less and one more make the spare
 at the agent the last relay, or a relay a spare.
+
+A chain for the agent some metres on is to keep it in sight all the way: its last relay sees every place until there.
+Only where the robots make no such chain, one serves that sees the agent when it has arrived. Which of the two it is,
+the proposal's reason says; its lower bound is one for chains of that kind, by any robots in any order. So a chain that
+loses sight of the agent on the way may well cost less.
 """
 
 from __future__ import annotations
@@ -16,7 +21,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import groupby, pairwise
 from typing import Final
 
 import numpy as np
@@ -47,6 +52,9 @@ LATENESS: Final = 3.0
 PIECE_M: Final = 0.5
 """Whether a relay sees the agent's way is asked so often."""
 
+ROUNDING: Final = 1e-9
+"""Relative: costs that differ by less are the same."""
+
 BASE, AGENT, FIRST_ROBOT = 0, 1, 2
 """Nodes of the team's tree."""
 
@@ -64,16 +72,15 @@ class Proposal:
     total_cost_m: float | None = None
     """What the search minimised (see the module)."""
     lower_bound_m: float | None = None
-    """No chain for the same preview can cost less."""
+    """No chain of the kind that the reason names costs less; equal to ``total_cost_m`` where that is proven least."""
 
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What a search found: rows of robots from the base outward, their placements, and the cost and its bound."""
+    """What a search found: rows of robots from the base outward, their placements, and a bound of what that costs."""
 
     robots: tuple[int, ...]
     places: tuple[int, ...]
-    cost_m: float
     lower_bound_m: float
 
 
@@ -124,13 +131,15 @@ class Proposer:
         pieces = walk(way, np.linspace(0.0, preview, 1 + math.ceil(preview / PIECE_M)))
         direct = self._graph.direct_weights(self._base, pieces)
         weights = self._graph.link_weights(pieces[-1])
-        where = f"for the agent at {name_place(way[0])}" + (f" and {preview:.1f} m on" if preview > 0.0 else "")
+        here = name_place(way[0])
+        there = f"for the agent {preview:.1f} m on from {here}" if preview > 0.0 else f"for the agent at {here}"
+        whole = f"for the agent at {here} and all its way {preview:.1f} m on" if preview > 0.0 else there
         if np.isfinite(direct).all():
             cost = METRES_PER_WEIGHT * float(direct[-1])
-            return Proposal((), True, f"no relay needed {where}", float(direct[-1]), cost, cost)
+            return Proposal((), True, f"no relay needed {whole}", float(direct[-1]), cost, cost)
         # The robots have until the agent is there.
         move = drive + LATENESS * np.maximum(0.0, drive - preview * self._speed_ratio)
-        for sees in (self._graph.sees_all(pieces), np.isfinite(weights)):
+        for sees, purpose in ((self._graph.sees_all(pieces), whole), (np.isfinite(weights), there)):
             to_agent = np.where(sees, METRES_PER_WEIGHT * weights, np.inf)
             found = self._find(move, to_agent, search, tree)
             if found is not None:
@@ -140,15 +149,18 @@ class Proposer:
                 )
                 links = [self._from_base[found.places[0]], *(self._links[hop] for hop in pairwise(found.places))]
                 cost = float(sum(links) + to_agent[found.places[-1]]) / METRES_PER_WEIGHT
-                reason = f"{relays_in_words(len(relays))} {where}"
-                return Proposal(relays, True, reason, cost, found.cost_m, found.lower_bound_m)
+                driven = float(sum(move[stop] for stop in zip(found.robots, found.places, strict=True)))
+                total_m = driven + RELAY_M * len(relays) + METRES_PER_WEIGHT * cost
+                # A search adds up in another order.
+                bound_m = total_m if found.lower_bound_m >= total_m * (1.0 - ROUNDING) else found.lower_bound_m
+                return Proposal(relays, True, f"{relays_in_words(len(relays))} {purpose}", cost, total_m, bound_m)
         return None
 
     def _find(self, move: Floats, to_agent: Floats, search: Search, tree: Ints) -> Found | None:
         """The chain of one search."""
         if search == "chain":
             chain = cheapest_chain(self._links, move, self._from_base, to_agent, RELAY_M)
-            return None if chain is None else Found(chain.robots, chain.cells, chain.cost, chain.lower_bound)
+            return None if chain is None else Found(chain.robots, chain.cells, chain.lower_bound)
         # Base and agent become two nodes of the tree, in two places of their own.
         places = len(self._links)
         base, agent = places, places + 1
@@ -163,15 +175,14 @@ class Proposer:
         found = redeploy(costs, W, search=search, tree=tree, ends=(BASE, AGENT), idle=True)
         if found.tree is None:
             return None
-        between = path_between(found.tree)
-        stops = [int(found.cells[node]) for node in between]
-        # Where two would stand in one place, one will do.
-        kept = [index for index, stop in enumerate(stops) if index == 0 or stop != stops[index - 1]]
+        cells = found.cells
+        # Where several would stand in one place, the one that drives least will do.
+        kept = [
+            (min(nodes, key=lambda node: float(costs[node, cells[node]])), int(place))
+            for place, nodes in groupby(path_between(found.tree), key=lambda node: cells[node])
+        ]
         return Found(
-            tuple(between[index] - FIRST_ROBOT for index in kept),
-            tuple(stops[index] for index in kept),
-            float(found.cost),
-            float(found.lower_bound),
+            tuple(node - FIRST_ROBOT for node, _ in kept), tuple(place for _, place in kept), float(found.lower_bound)
         )
 
     def relays_needed(self, points: ArrayLike) -> Ints:

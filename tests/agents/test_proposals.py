@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import re
+from dataclasses import replace
 from functools import cache
-from itertools import pairwise
+from itertools import pairwise, permutations
 from typing import get_args
 
 import networkx as nx
@@ -13,9 +15,10 @@ import pytest
 
 import maps
 from agents.leader import DeploymentPlanner, PlacementKind, Plan
-from agents.proposals import LATENESS, METRES_PER_WEIGHT, RELAY_M, path_between
+from agents.proposals import LATENESS, METRES_PER_WEIGHT, PIECE_M, PREVIEWS_M, RELAY_M, Proposer, path_between
+from planning.chain import cheapest_chain
 from planning.environment import Environment
-from planning.foresight import chain_holds
+from planning.foresight import chain_holds, length, walk
 from planning.redeployment import Search, redeploy
 from protocol.messages import Point
 
@@ -56,21 +59,82 @@ def _links(kind: PlacementKind, stops: list[Point]) -> list[float]:
 
 
 @pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("search", SEARCHES)
 @pytest.mark.parametrize("seed", range(4))
-def test_a_plan_costs_what_its_robots_drive_and_its_links_weigh(kind: PlacementKind, seed: int) -> None:
-    """An agent at rest is already where it is, so every metre counts as late."""
-    agent, *starts = _places(7, seed)
-    robots = _team(starts)
-    planner = _planner(kind, "chain")
-    plan = planner.plan(agent, (), robots, None)
-    relays = _relays(plan)
-    links = _links(kind, [BASE, *(place for _, place in relays), agent])
-    driven = [planner.graph.geodesics.length(robots[name], place) for name, place in relays]
-    assert plan.cost == pytest.approx(sum(links))
-    assert plan.total_cost_m == pytest.approx(
-        (1.0 + LATENESS) * sum(driven) + RELAY_M * len(relays) + METRES_PER_WEIGHT * sum(links)
-    )
-    assert plan.lower_bound_m == plan.total_cost_m
+def test_a_plan_costs_what_its_robots_drive_and_its_links_weigh(kind: PlacementKind, search: Search, seed: int) -> None:
+    """Agents at rest are already where they are, so every metre counts as late."""
+    *agents, home = _places(5, seed)
+    robots = _team([home] * 6)
+    planner = _planner(kind, search)
+    plan: Plan | None = None
+    for agent in agents:
+        plan = planner.plan(agent, (), robots, None if plan is None else replace(plan, serves=False))
+        relays = _relays(plan)
+        links = _links(kind, [BASE, *(place for _, place in relays), agent])
+        driven = [planner.graph.geodesics.length(robots[name], place) for name, place in relays]
+        assert plan.cost == pytest.approx(sum(links))
+        assert plan.total_cost_m == pytest.approx(
+            (1.0 + LATENESS) * sum(driven) + RELAY_M * len(relays) + METRES_PER_WEIGHT * sum(links)
+        )
+        assert plan.lower_bound_m is not None and plan.total_cost_m is not None
+        assert plan.lower_bound_m <= plan.total_cost_m
+        if search == "chain":
+            assert plan.lower_bound_m == plan.total_cost_m
+        robots = {place.robot: place.position for place in plan.placements}
+
+
+HOOK = Environment([(0, 0), (20, 0), (20, 6), (18, 6), (18, 2), (2, 2), (2, 6), (0, 6)], name="hook")
+"""A corridor of 20 m with a stub up at each end."""
+
+
+def test_the_fixed_search_pays_for_the_relays_that_it_keeps_alone() -> None:
+    """Two relays where one does: both may be put in one place, and then only one of them is sent, and paid for."""
+    planner = DeploymentPlanner(HOOK, (1.0, 1.0), RADIUS_M, "inflection", placements="points", search="fixed")
+    graph = planner.graph
+    proposer = Proposer(graph, (1.0, 1.0), "fixed", robot_speed_m_s=1.0, agent_speed_m_s=1.0)
+    robots = {"robot1": (10.0, 1.0), "robot2": (18.5, 1.0), "robot3": (1.0, 5.0)}
+    found = 0
+    for standing in permutations(robots):
+        way = np.array([(19.0, 5.5)])
+        for proposal in proposer.chains(way, robots, standing):
+            driven = sum(graph.geodesics.length(robots[relay.robot], relay.position) for relay in proposal.relays)
+            assert proposal.total_cost_m == pytest.approx(
+                (1.0 + LATENESS) * driven + RELAY_M * len(proposal.relays) + METRES_PER_WEIGHT * proposal.cost
+            )
+            assert len({relay.position for relay in proposal.relays}) == len(proposal.relays)
+            found += len(proposal.relays) < len(standing)
+    assert found > 0
+
+
+@pytest.mark.parametrize("search", SEARCHES)
+def test_no_chain_of_the_named_kind_costs_less_than_the_bound(search: Search) -> None:
+    """And the reason names the kind: in sight of the agent on all its way, or when it has arrived there."""
+    graph = _planner("points", "chain").graph
+    proposer = Proposer(graph, BASE, search, robot_speed_m_s=1.4, agent_speed_m_s=0.9)
+    whole = partial = cheaper = 0
+    for seed in range(6):
+        here, there, *starts = _places(6, 70 + seed)
+        way, robots = graph.geodesics.path(here, there), _team(starts)
+        drive = np.array([graph.distances_from(place) for place in robots.values()])
+        for proposal in filter(lambda found: found.relays, proposer.chains(way, robots, [])):
+            ahead = re.search(r"([0-9.]+) m on", proposal.reason)
+            preview = 0.0 if ahead is None else min({*PREVIEWS_M, length(way)}, key=lambda m: abs(m - float(ahead[1])))
+            pieces = walk(way, np.linspace(0.0, preview, 1 + math.ceil(preview / PIECE_M)))
+            sees = graph.sees_all(pieces if "all its way" in proposal.reason else pieces[-1:])
+            weights = METRES_PER_WEIGHT * graph.link_weights(pieces[-1])
+            costs = drive + LATENESS * np.maximum(0.0, drive - preview * 1.4 / 0.9)
+            links = METRES_PER_WEIGHT * graph.weights, costs, METRES_PER_WEIGHT * graph.link_weights(BASE)
+            least = cheapest_chain(*links, np.where(sees, weights, np.inf), RELAY_M)
+            assert least is not None and proposal.lower_bound_m is not None and proposal.total_cost_m is not None
+            assert proposal.lower_bound_m <= least.cost * (1 + 1e-9) <= proposal.total_cost_m * (1 + 2e-9)
+            last = np.array(proposal.relays[-1].position)
+            assert np.all(_office().line_of_sight(last, pieces if "all its way" in proposal.reason else pieces[-1:]))
+            anyhow = cheapest_chain(*links, weights, RELAY_M)
+            assert anyhow is not None
+            cheaper += anyhow.cost < least.cost - 1e-6
+            whole += "all its way" in proposal.reason
+            partial += ahead is not None and "all its way" not in proposal.reason
+    assert whole > 0 and partial > 0 and cheaper > 0
 
 
 @pytest.mark.parametrize("kind", KINDS)
