@@ -68,7 +68,7 @@ class Plan:
     total_cost_m: float | None = None
     """With what the relays drove for it when it was chosen (:mod:`agents.proposals`); None without a chain."""
     lower_bound_m: float | None = None
-    """No chain for the same place of the agent could have cost less in all."""
+    """No chain could have cost less that sees as much of the agent's way as ``reason`` says."""
 
 
 class DeploymentPlanner:

@@ -15,7 +15,7 @@ entity                  what is there
 ``connected``           agent visible, chain connected, team connected: 0 or 1 each
 ``lambda2``             algebraic connectivity of the team's visibility graph
 ``planning_ms``         how long each planning job took
-``cost``                of each decision, and its lower bound, metres
+``cost``                of each decision, metres, and the least of chains such as its reason names
 ``mode/<peer>``         what the peer's body does
 ``log/<peer>``          log lines, and the leader's decisions with their reasons
 ======================  ==============================================================================

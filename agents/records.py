@@ -36,13 +36,13 @@ class Decision(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", ta
 
 
 def in_words(deployment: Deployment) -> str:
-    """What a deployment costs and could cost at least; empty without a chain."""
+    """What a deployment costs and could cost at least, to be read after its reason; empty without a chain."""
     cost_m, bound_m = deployment.total_cost_m, deployment.lower_bound_m
     if cost_m is None or bound_m is None:
         return ""
     if bound_m >= cost_m:
-        return f"costs {cost_m:.1f} m, the least"
-    return f"costs {cost_m:.1f} m, at least {bound_m:.1f} m were needed"
+        return f"costs {cost_m:.1f} m, the least of such chains"
+    return f"costs {cost_m:.1f} m, such chains at least {bound_m:.1f} m"
 
 
 class Planned(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag="planned"):

@@ -113,7 +113,7 @@ class TopologyChange(msgspec.Struct, frozen=True, kw_only=True):
     total_cost_m: float | None = None
     """Of the chain, in metres, as the leader counted it."""
     lower_bound_m: float | None = None
-    """No chain would have cost less."""
+    """No chain would have cost less that sees as much of the agent's way as the reason says."""
 
 
 class Overlap(msgspec.Struct, frozen=True, kw_only=True):

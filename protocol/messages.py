@@ -136,8 +136,8 @@ class Deployment(Body, frozen=True, kw_only=True, tag="deployment"):
     total_cost_m: float | None = None
     """What the leader minimised, in metres: what the relays drive, and what the links are worth; none for no chain."""
     lower_bound_m: float | None = None
-    """No chain that serves the same purpose costs less than this in all; equal to ``total_cost_m`` if that is proven to
-    be the least."""
+    """No chain costs less in all that sees as much of the agent's way as ``reason`` says; equal to ``total_cost_m`` if
+    that is proven to be the least."""
     relays_needed: Count
     reason: Text
     """Why this decision replaced the one before."""

@@ -149,8 +149,8 @@ def test_the_tree_shows_everybody_and_the_log_the_reasons(file: Path) -> None:
     assert [set(nodes) for _, nodes in trees] == [{"base", "robot_1", "robot_2", "agent"}] * 3
     texts = [text for _, (text,) in rows(file, "/log/base", "TextLog:text")]
     reason = "robot_2 sees the agent for longer; λ2 “quoted”"
-    assert texts[1] == f"base: decision 2 (new tree, 50 ms): {reason}; costs 12.0 m, the least"
-    assert texts[2].endswith("; costs 13.0 m, at least 12.0 m were needed")
+    assert texts[1] == f"base: decision 2 (new tree, 50 ms): {reason}; costs 12.0 m, the least of such chains"
+    assert texts[2].endswith("; costs 13.0 m, such chains at least 12.0 m")
     assert "costs" not in texts[0]
 
 
