@@ -102,7 +102,7 @@ def _read(file: Path, announce: Announce) -> Arrays | None:
     except OSError:
         return None
     try:
-        if content[-SEAL_BYTES:] != _seal(content[:-SEAL_BYTES]):
+        if content[-SEAL_BYTES:] != _seal(memoryview(content)[:-SEAL_BYTES]):
             raise ValueError("its checksum is another")
         with np.load(io.BytesIO(content), allow_pickle=False) as archive:
             if str(archive["version"]) != _version():
@@ -133,7 +133,7 @@ def _write(file: Path, arrays: Arrays) -> None:
     _drop_oldest(file.parent)
 
 
-def _seal(content: bytes) -> bytes:
+def _seal(content: bytes | memoryview) -> bytes:
     """The comment of an archive whose other bytes are these."""
     return f"{zlib.crc32(content):0{SEAL_BYTES}x}".encode()
 
