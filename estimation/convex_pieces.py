@@ -58,7 +58,7 @@ def cut(
     Args:
         pieces: the set.
         counts: see the module.
-        checked: see the module; inf where not at all.
+        checked: see the module; inf where not at all, 0 where that is not asked for.
         annuli: (k, 4) float: x, y, inner and outer radius, metres, frame of the set. The set lies in all but the last,
             up to tolerances.
         out: (MOST_PIECES, MOST_VERTICES, 2), receives the pieces.

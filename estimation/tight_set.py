@@ -20,7 +20,7 @@ the ranges decides. A target that moves: 1.02 times what exact growing and cutti
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -47,6 +47,9 @@ MERGE_SHARE = 0.002
 
 MERGE_SHARE_MOVING = 0.006
 """The same after a move of the target, which blurs the set anyway."""
+
+MOST_RELAXED = 64
+"""Pieces of a set that some ranges may contradict: it is looser anyway, and as many times as costly."""
 
 REMEMBERED = 24
 """Ranges that are cut again where the set has become thinner."""
@@ -122,6 +125,7 @@ class _Polygons:
     def cut_or(self, held: _Union | None, fallback: _Union, annulus: Annulus) -> _Union:
         inside = self.begin(annulus) if held is None else self.cut(held, annulus)
         parts = [] if inside is None else [inside]
+        fallback = replace(fallback, checked=np.zeros(len(fallback.counts)), annuli=_NO_ANNULI)
         # Padded the other way: outside of the annulus means outside of what a right range can leave.
         hole, rim = annulus.inner + 2.0 * PADDING_M, annulus.outer - 2.0 * PADDING_M
         for x, y, low, high in ((annulus.x, annulus.y, 0.0, hole), (annulus.x, annulus.y, rim, math.inf)):
@@ -130,10 +134,11 @@ class _Polygons:
                 parts.append(outside)
         pieces = np.concatenate([part.pieces for part in parts])
         counts = np.concatenate([part.counts for part in parts])
-        checked = np.full(len(counts), np.inf)
+        # Points outside of some annuli are in the set: there is none to cut again, and nothing to check.
+        checked = np.zeros(len(counts))
         area = sum(part.area for part in parts)
-        if len(counts) > MOST_PIECES // 4:
-            m = convex_pieces.merge(pieces, counts, checked, len(counts), MERGE_SHARE, MOST_PIECES // 4)
+        if len(counts) > MOST_RELAXED:
+            m = convex_pieces.merge(pieces, counts, checked, len(counts), MERGE_SHARE, MOST_RELAXED)
             pieces, counts, checked = pieces[:m].copy(), counts[:m].copy(), checked[:m].copy()
             area = convex_pieces.total_area(pieces, counts)
         return _Union(pieces, counts, checked, _NO_ANNULI, area)
