@@ -112,15 +112,13 @@ class CompiledMap:
     @cached_property
     def geodesics(self) -> GeodesicMap:
         """Shortest paths of the robots' centres, with the table of the reflex vertices."""
-        geodesics = GeodesicMap(self.free)
 
         def compute() -> Arrays:
-            lengths, predecessors = GeodesicMap(self.free)._all_pairs
+            lengths, predecessors = GeodesicMap(self.free).corner_paths
             return {"lengths": lengths, "predecessors": predecessors}
 
         arrays = self._fetch("corners", digest(*self.free.rings), compute)
-        geodesics._all_pairs = arrays["lengths"], arrays["predecessors"]
-        return geodesics
+        return GeodesicMap(self.free, (arrays["lengths"], arrays["predecessors"]))
 
     @cached_property
     def cell_placements(self) -> PlacementGraph:
@@ -146,26 +144,17 @@ class CompiledMap:
         positions, kept = arrays["positions"], arrays["cells"]
         weights = np.ascontiguousarray(self.weights[np.ix_(kept, kept)])
         sight = CellSight(self.cells, self.weights, kept)
-        return self._with_table(
-            PlacementGraph(
-                "cells",
-                self.environment,
-                self.radius_m,
-                self.free,
-                positions,
-                np.isfinite(weights),
-                weights,
-                kept,
-                sight,
-            )
-        )
+        return PlacementGraph(
+            "cells", self.environment, self.radius_m, self.free, positions, np.isfinite(weights), weights, kept, sight,
+            _KeptTable(self.geodesics, positions, self._fetch),
+        )  # fmt: skip
 
     def point_placements(self, spacing_m: float | None = None) -> PlacementGraph:
         """`PlacementGraph.from_points` at this spacing, metres, or at one that suits the map."""
 
         def compute() -> Arrays:
             graph = PlacementGraph.from_points(self.environment, self.radius_m, spacing_m, containing=self.containing)
-            sight = graph._sight
+            sight = graph.sight
             assert isinstance(sight, PointSight)
             return {
                 "positions": graph.positions,
@@ -178,25 +167,10 @@ class CompiledMap:
         positions = arrays["positions"]
         sight = PointSight(self.environment, self.free, positions, float(arrays["greatest_m"]))
         no_cells = np.full(len(positions), -1)
-        return self._with_table(
-            PlacementGraph(
-                "points",
-                self.environment,
-                self.radius_m,
-                self.free,
-                positions,
-                arrays["visible"],
-                arrays["weights"],
-                no_cells,
-                sight,
-            )
-        )
-
-    def _with_table(self, graph: PlacementGraph) -> PlacementGraph:
-        """The graph with what it would compute when first asked for, as `cached_property` keeps it."""
-        vars(graph)["geodesics"] = self.geodesics
-        vars(graph)["_table"] = _KeptTable(self.geodesics, graph.positions, self._fetch)
-        return graph
+        return PlacementGraph(
+            "points", self.environment, self.radius_m, self.free, positions, arrays["visible"], arrays["weights"],
+            no_cells, sight, _KeptTable(self.geodesics, positions, self._fetch),
+        )  # fmt: skip
 
     @cached_property
     def _paths(self) -> Arrays:
@@ -228,20 +202,17 @@ class _KeptTable(GeodesicTable):
         fetch: Callable[[str, str, Callable[[], Mapping[str, NDArray[Any]]]], Arrays],
     ) -> None:
         def compute() -> Arrays:
-            return dict(zip(names, GeodesicTable(geodesics, places)._legs, strict=True))
+            return dict(zip(("starts", "bends", "lengths"), GeodesicTable(geodesics, places).legs, strict=True))
 
-        names = ("starts", "bends", "lengths")
-        self.places = np.array(places, dtype=np.float64)
-        self._geodesics = geodesics
-        self._fetch, self._key = fetch, digest(*geodesics.environment.rings, self.places)
+        self._fetch, self._key = fetch, digest(*geodesics.environment.rings, np.asarray(places))
         legs = fetch("legs", self._key, compute)
-        self._legs = legs["starts"], legs["bends"], legs["lengths"]
+        super().__init__(geodesics, places, (legs["starts"], legs["bends"], legs["lengths"]))
 
     @cached_property
     def between(self) -> Floats:
         """As in `GeodesicTable`."""
         arrays = self._fetch(
-            "between", self._key, lambda: {"metres": GeodesicTable(self._geodesics, self.places).between}
+            "between", self._key, lambda: {"metres": GeodesicTable(self.geodesics, self.places, self.legs).between}
         )
         arrays["metres"].flags.writeable = False
         return arrays["metres"]

@@ -9,7 +9,6 @@ them. A query joins its ends to the vertices that they see by a tangent segment,
 from __future__ import annotations
 
 import math
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -37,10 +36,12 @@ class GeodesicMap:
 
     Args:
         environment: the space where the robot's centre may be, walls included.
+        corner_paths: :attr:`corner_paths` of another such map of this environment, if they are known.
     """
 
-    def __init__(self, environment: Environment) -> None:
+    def __init__(self, environment: Environment, corner_paths: tuple[Floats, Ints] | None = None) -> None:
         self.environment = environment
+        self._corner_paths = corner_paths
         vertices, reflex = environment.vertices, environment.is_reflex
         after = environment.walls[:, 1]
         before = np.empty_like(vertices)
@@ -109,21 +110,26 @@ class GeodesicMap:
     def _space(self) -> tuple[Floats, float]:
         return self.environment.walls, self.environment.tolerance_m
 
-    @cached_property
-    def _all_pairs(self) -> tuple[Floats, Ints]:
-        """Lengths and predecessors of the shortest paths between reflex vertices, both (r, r)."""
-        edges = _join_corners(self.corners, *self._space)
-        distances, predecessors = dijkstra(csr_array(edges), directed=False, return_predecessors=True)
-        return np.ascontiguousarray(distances), np.ascontiguousarray(predecessors)
+    @property
+    def corner_paths(self) -> tuple[Floats, Ints]:
+        """Lengths (metres) and predecessors of the shortest paths between reflex vertices, both (r, r).
+
+        Computed when they are first asked for.
+        """
+        if self._corner_paths is None:
+            edges = _join_corners(self.corners, *self._space)
+            distances, predecessors = dijkstra(csr_array(edges), directed=False, return_predecessors=True)
+            self._corner_paths = np.ascontiguousarray(distances), np.ascontiguousarray(predecessors)
+        return self._corner_paths
 
     @property
     def corner_lengths(self) -> Floats:
-        """(r, r) float, metres: shortest paths between reflex vertices. Computed when it is first asked for."""
-        return self._all_pairs[0]
+        """(r, r) float, metres: the lengths of :attr:`corner_paths`."""
+        return self.corner_paths[0]
 
     @property
     def _predecessors(self) -> Ints:
-        return self._all_pairs[1]
+        return self.corner_paths[1]
 
     def _read_point(self, p: ArrayLike) -> Floats:
         point = np.array(p, dtype=np.float64).reshape(2)

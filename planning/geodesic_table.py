@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +20,7 @@ from planning.line_of_sight import free_points_see
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Legs: TypeAlias = tuple[Ints, Ints, Floats]
 
 
 class GeodesicTable:
@@ -27,6 +29,7 @@ class GeodesicTable:
     Args:
         geodesics: of the space where the robot's centre may be.
         places: (N, 2) float, metres, map frame.
+        legs: :attr:`legs` of another table of the same places in the same space, if they are known.
 
     Raises:
         NotInFreeSpace: a place is no point of that space.
@@ -35,12 +38,15 @@ class GeodesicTable:
     for t legs of a place.
     """
 
-    def __init__(self, geodesics: GeodesicMap, places: ArrayLike) -> None:
+    def __init__(self, geodesics: GeodesicMap, places: ArrayLike, legs: Legs | None = None) -> None:
         self.places: Floats = np.array(places, dtype=np.float64, order="C").reshape(-1, 2)
-        geodesics.check_free(self.places)
-        self._geodesics = geodesics
-        walls, tolerance = geodesics.environment.walls, geodesics.environment.tolerance_m
-        self._legs = _find_legs(self.places, geodesics.corners, walls, tolerance)
+        self.geodesics = geodesics
+        if legs is None:
+            geodesics.check_free(self.places)
+            walls, tolerance = geodesics.environment.walls, geodesics.environment.tolerance_m
+            legs = _find_legs(self.places, geodesics.corners, walls, tolerance)
+        self.legs: Legs = legs
+        """Of place i: entries ``starts[i]`` to ``starts[i + 1]`` of two lists: reflex vertices and lengths, metres."""
 
     def lengths(self, p: ArrayLike) -> Floats:
         """Lengths of the shortest paths from p (2,), metres, to each place: (N,) float. O(t r + N (w + t)).
@@ -49,26 +55,26 @@ class GeodesicTable:
             NotInFreeSpace: p is no point of the space.
         """
         start = np.array(p, dtype=np.float64, order="C").reshape(1, 2)
-        self._geodesics.check_free(start)
-        geodesics = self._geodesics
+        self.geodesics.check_free(start)
+        geodesics = self.geodesics
         walls, tolerance = geodesics.environment.walls, geodesics.environment.tolerance_m
         found: Floats = _find_row(
-            start[0], self.places, *self._legs, geodesics.corners, geodesics.corner_lengths, walls, tolerance
+            start[0], self.places, *self.legs, geodesics.corners, geodesics.corner_lengths, walls, tolerance
         )
         return found
 
     @cached_property
     def between(self) -> Floats:
         """Lengths of the shortest paths between all places: (N, N) float, metres, symmetric. O(N t r + N² (w + t))."""
-        geodesics = self._geodesics
+        geodesics = self.geodesics
         walls, tolerance = geodesics.environment.walls, geodesics.environment.tolerance_m
-        found: Floats = _find_table(self.places, *self._legs, geodesics.corner_lengths, walls, tolerance)
+        found: Floats = _find_table(self.places, *self.legs, geodesics.corner_lengths, walls, tolerance)
         found.flags.writeable = False
         return found
 
 
 @kernel
-def _find_legs(places: Floats, corners: Floats, walls: Floats, tolerance: float) -> tuple[Ints, Ints, Floats]:
+def _find_legs(places: Floats, corners: Floats, walls: Floats, tolerance: float) -> Legs:
     """The legs of place i are entries ``starts[i]`` to ``starts[i + 1]`` of two lists: reflex vertices and lengths."""
     starts = np.zeros(len(places) + 1, np.int64)
     bends = np.empty(64, np.int64)

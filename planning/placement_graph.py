@@ -62,6 +62,8 @@ class PlacementGraph:
         weights: (N, N) float, symmetric, without unit: of the links (see the module), inf where two placements do not
             see each other, 0 on the diagonal.
         cells: (N,) int: the cell that each placement stands for; -1 where they are points.
+        sight: how placements see points that are none of them.
+        known_table: geodesics to the placements, if they are known already.
     """
 
     kind: Literal["cells", "points"]
@@ -72,7 +74,8 @@ class PlacementGraph:
     visible: Bools
     weights: Floats
     cells: Ints
-    _sight: Sight
+    sight: Sight
+    known_table: GeodesicTable | None = None
 
     def __len__(self) -> int:
         return len(self.positions)
@@ -158,16 +161,16 @@ class PlacementGraph:
     @property
     def outlines(self) -> tuple[Floats, ...]:
         """The cells of the map, those without a placement included, each (m, 2) float, metres; none for points."""
-        return self._sight.outlines
+        return self.sight.outlines
 
     @cached_property
     def geodesics(self) -> GeodesicMap:
         """Shortest paths of the robots' centres."""
-        return GeodesicMap(self.free)
+        return GeodesicMap(self.free) if self.known_table is None else self.known_table.geodesics
 
     @cached_property
     def _table(self) -> GeodesicTable:
-        return GeodesicTable(self.geodesics, self.positions)
+        return self.known_table or GeodesicTable(self.geodesics, self.positions)
 
     @property
     def distances(self) -> Floats:
@@ -188,7 +191,7 @@ class PlacementGraph:
         For cells that is a question of the point's cell, which all of the placement's cell must see; a point in the
         placement's own cell is joined for 0. O(1) for cells, O(N w) for points.
         """
-        return self._sight.weights(np.array(point, dtype=np.float64).reshape(2))
+        return self.sight.weights(np.array(point, dtype=np.float64).reshape(2))
 
     def sees(self, point: ArrayLike) -> Bools:
         """Which placements see a point (2,), metres: (N,) bool. As :meth:`link_weights`."""
@@ -196,11 +199,11 @@ class PlacementGraph:
 
     def sees_all(self, points: ArrayLike) -> Bools:
         """Which placements see every one of ``points`` (m, 2), metres: (N,) bool. As :meth:`link_weights`."""
-        return self._sight.sees_all(np.array(points, dtype=np.float64, order="C").reshape(-1, 2))
+        return self.sight.sees_all(np.array(points, dtype=np.float64, order="C").reshape(-1, 2))
 
     def direct_weights(self, p: ArrayLike, points: ArrayLike) -> Floats:
         """Weights of the links between p (2,) and points (m, 2), metres, without a relay: (m,) float, inf for none."""
-        return self._sight.direct(
+        return self.sight.direct(
             np.array(p, dtype=np.float64).reshape(2), np.array(points, dtype=np.float64, order="C").reshape(-1, 2)
         )
 
@@ -225,4 +228,4 @@ class PlacementGraph:
         Cells: the centroid of each, which is as good as all its points. Points: the placements and the vertices of
         ``free``, among which are the corners of rooms that are hardest to see into.
         """
-        return self._sight.probes
+        return self.sight.probes
