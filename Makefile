@@ -17,7 +17,10 @@ lint: $(READY)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
+# The other people's estimators that it compares with are no dependencies: without them it says so and goes on.
 bench: $(READY)
+	-@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --require-hashes \
+		--requirement tests/benchmarks/references.lock
 	$(BIN)/python -m tests.benchmarks
 
 docs: $(READY)
@@ -27,6 +30,8 @@ docs: $(READY)
 lock:
 	uv pip compile --universal --python-version 3.11 --generate-hashes --no-header --no-emit-index-url \
 		--no-annotate --group test --group lint --group build pyproject.toml -o requirements.lock
+	printf 'filterpy\ncodac\n' | uv pip compile --universal --python-version 3.11 --no-deps --generate-hashes --no-header \
+		--no-emit-index-url --no-annotate - -o tests/benchmarks/references.lock
 
 $(READY): requirements.lock pyproject.toml
 	@test -n "$(PYTHON)" || { echo "Sightline needs Python 3.11 or newer: install it, or say make PYTHON=/path/to/python3"; exit 2; }

@@ -1,7 +1,7 @@
 """The benchmark's ranges, told to other people's estimators: filterpy's particle filter and codac's paving.
 
-Neither is a dependency; ``pip install --no-deps filterpy codac`` beside the project is enough. What is not there, or
-does not load, gives no row, and a line says so.
+Neither is a dependency; ``make bench`` installs them, of the versions in ``references.lock``, where they install. What
+is not there, or does not load, gives no row, and a line says so.
 """
 
 from __future__ import annotations
