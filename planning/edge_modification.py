@@ -18,6 +18,7 @@ Where nodes may idle, a branch without an end sends no message: it would be left
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -30,6 +31,22 @@ ROUNDING: Final = 1e-12
 """Relative: a modification that is not cheaper by more than this is no improvement."""
 
 Edge = tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Exchange:
+    """One edge of a tree for another that joins what it leaves."""
+
+    cost: float
+    """Of the tree that comes of it."""
+    cut: Edge
+    added: Edge
+
+    def applied(self, tree: Ints) -> Ints:
+        """The tree, (m, 2) int, with the other edge in the place of the one that is cut."""
+        modified = tree.copy()
+        modified[(tree == self.cut).all(axis=1) | (tree == self.cut[::-1]).all(axis=1)] = self.added
+        return modified
 
 
 def best_modification(links: Links, move: Floats, tree: Ints, ends: list[int]) -> tuple[float, Ints]:
@@ -46,9 +63,21 @@ def best_modification(links: Links, move: Floats, tree: Ints, ends: list[int]) -
 
     Complexity: O(k² N²) for the products and O(k³ N) for the sums.
     """
+    cost, exchanges = find_exchanges(links, move, tree, ends)
+    return (exchanges[0].cost, exchanges[0].applied(tree)) if exchanges else (cost, tree)
+
+
+def find_exchanges(links: Links, move: Floats, tree: Ints, ends: list[int]) -> tuple[float, list[Exchange]]:
+    """For each edge of a tree the one that is best in its place, where that makes the tree cheaper.
+
+    Arguments and complexity as of :func:`best_modification`.
+
+    Returns:
+        The cost of the tree as it is, inf if it cannot be placed, and the exchanges, the cheapest tree first.
+    """
     messages = _Messages(links, move, tree, ends)
-    best = float(messages.rooted(ends[0]).min())
-    modification: tuple[Edge, Edge] | None = None
+    cost = float(messages.rooted(ends[0]).min())
+    exchanges = []
     cuts = messages.cuts()
     smaller = [min(sides, key=lambda side: len(side.nodes)) for sides in cuts]
     rows = [side.rooted for side in smaller]
@@ -57,15 +86,9 @@ def best_modification(links: Links, move: Floats, tree: Ints, ends: list[int]) -
         far = second if near is first else first
         totals = (far.rooted[:, None] + hanging).min(axis=2)
         place, other = np.unravel_index(np.argmin(totals), totals.shape)
-        if totals[place, other] < best * (1.0 - ROUNDING):
-            best = float(totals[place, other])
-            modification = first.cut, (far.nodes[place], near.nodes[other])
-    if modification is None:
-        return best, tree
-    cut, added = modification
-    modified = tree.copy()
-    modified[(tree == cut).all(axis=1) | (tree == cut[::-1]).all(axis=1)] = added
-    return best, modified
+        if totals[place, other] < cost * (1.0 - ROUNDING):
+            exchanges.append(Exchange(float(totals[place, other]), first.cut, (far.nodes[place], near.nodes[other])))
+    return cost, sorted(exchanges, key=lambda exchange: exchange.cost)
 
 
 class _Side:

@@ -48,29 +48,41 @@ def place_nodes(links: Links, move: Floats, tree: Ints, ends: list[int]) -> tupl
 
     Complexity: O(k m) for m links, at most O(k N²).
     """
-    neighbours = neighbours_of(tree, len(move))
-    generations = [[ends[0]]]
-    parents = {ends[0]: -1}
-    while generations[-1]:
-        for i in generations[-1]:
-            parents.update((j, i) for j in neighbours[i] if j != parents[i])
-        generations.append([j for i in generations[-1] for j in neighbours[i] if j != parents[i]])
-    kept = set(ends)
-    for generation in reversed(generations):
-        kept |= {parents[i] for i in generation if i in kept}
-
-    costs = move.copy()
-    for generation in generations[:0:-1]:
-        hanging = [i for i in generation if i in kept]
-        for i, hung in zip(hanging, min_plus(links, costs[hanging]), strict=True):
-            costs[parents[i]] += hung
-    cells = np.full(len(move), -1, dtype=np.int64)
+    hanging = _Hanging(links, move, tree, ends)
+    costs, cells = hanging.costs, np.full(len(move), -1, dtype=np.int64)
     cells[ends[0]] = np.argmin(costs[ends[0]])
     if np.isinf(costs[ends[0], cells[ends[0]]]):
         return None
-    for generation in generations[1:]:
+    for generation in hanging.generations[1:]:
         for i in generation:
-            if i in kept:
-                choices, weights = links.of(int(cells[parents[i]]))
-                cells[i] = choices[np.argmin(costs[i, choices] + weights)]
+            choices, weights = links.of(int(cells[hanging.parents[i]]))
+            cells[i] = choices[np.argmin(costs[i, choices] + weights)]
     return tree[(cells[tree] >= 0).all(axis=1)], cells
+
+
+def topology_cost(links: Links, move: Floats, tree: Ints, ends: list[int]) -> float:
+    """The cost of what :func:`place_nodes` finds, inf if it finds nothing; arguments as there."""
+    return float(_Hanging(links, move, tree, ends).costs[ends[0]].min())
+
+
+class _Hanging:
+    """What the part of the tree below each node costs; the first end is the root."""
+
+    def __init__(self, links: Links, move: Floats, tree: Ints, ends: list[int]) -> None:
+        neighbours = neighbours_of(tree, len(move))
+        generations = [[ends[0]]]
+        self.parents = {ends[0]: -1}
+        while generations[-1]:
+            for i in generations[-1]:
+                self.parents.update((j, i) for j in neighbours[i] if j != self.parents[i])
+            generations.append([j for i in generations[-1] for j in neighbours[i] if j != self.parents[i]])
+        kept = set(ends)
+        for generation in reversed(generations):
+            kept |= {self.parents[i] for i in generation if i in kept}
+        self.generations = [[i for i in generation if i in kept] for generation in generations]
+        """The nodes that stay, by how many edges they are away from the root."""
+        self.costs = move.copy()
+        """(k, N) float: C of the nodes that stay."""
+        for hanging in self.generations[:0:-1]:
+            for i, hung in zip(hanging, min_plus(links, self.costs[hanging]), strict=True):
+                self.costs[self.parents[i]] += hung

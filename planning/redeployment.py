@@ -27,6 +27,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planning.chain import chain_between
+from planning.distant_nodes import bound_by_distant
 from planning.edge_modification import best_modification
 from planning.iterated_modification import search_with_bound
 from planning.known_topology import neighbours_of, place_nodes
@@ -45,6 +46,15 @@ RELAXED_STATES: Final = 2**11
 
 BOUND_STATES: Final = 2**5
 """States that the lower bound of the other searches may take: 6 nodes are told apart, of more some counted together."""
+
+MANY: Final = 12
+"""Nodes from which on their lower bound is also one by distant nodes: counting many together says next to nothing."""
+
+BOUND_DISTANT: Final = 4
+"""Nodes, besides the root, of that bound."""
+
+MOST_JOINED: Final = 1000
+"""Placements up to which that bound, O(N³), takes no longer than the search."""
 
 
 class InvalidRedeployment(ValueError):
@@ -127,6 +137,8 @@ def redeploy(
     if search == "one-edge":
         _, topology = best_modification(links, costs, topology, staying)
     bound = bound_below(links, costs, staying, BOUND_STATES)
+    if number >= MANY and len(weights) <= MOST_JOINED:
+        bound = max(bound, bound_by_distant(links, costs, staying, BOUND_DISTANT))
     placed = place_nodes(links, costs, topology, staying)
     return _result(costs, weights, float(mu), placed, bound)
 

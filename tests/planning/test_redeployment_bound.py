@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict
 from math import inf
 from types import SimpleNamespace
@@ -11,10 +12,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planning import redeploy
+from planning import iterated_modification, redeploy
+from planning.distant_nodes import bound_by_distant
 from planning.iterated_modification import improve, search_with_bound
+from planning.known_topology import topology_cost
 from planning.min_plus import LANES, min_plus, scaled_links
-from planning.redeployment import EXACT_STATES
+from planning.redeployment import EXACT_STATES, RELAXED_STATES
 from planning.redeployment_bound import PriceAscent, count_nodes, relax, without_rounding
 from planning.subset_programme import solve_subsets, states_of
 from tests.planning.redeployment_oracles import (
@@ -139,6 +142,62 @@ def test_more_robots_than_can_be_searched(idle: bool) -> None:
     assert (again.cost, again.lower_bound) == (found.cost, found.lower_bound)
 
 
+def test_forty_two_nodes_take_bounded_work_and_a_bound_that_says_something(monkeypatch: pytest.MonkeyPatch) -> None:
+    case = spread_case(42, seed=1, number=60)
+    links, calls = scaled_links(case.W, case.mu), {"find_exchanges": 0, "relax": 0}
+
+    def counted(name: str) -> Callable[..., object]:
+        plain = getattr(iterated_modification, name)
+
+        def count(*arguments: object) -> object:
+            calls[name] += 1
+            return plain(*arguments)
+
+        return count
+
+    for name in calls:
+        monkeypatch.setattr(iterated_modification, name, counted(name))
+    monkeypatch.setattr(iterated_modification, "EFFORT", 200_000_000)
+    found = redeploy(case.move, case.W, case.mu, tree=case.tree)
+    check_redeployment(case, found, idle=False)
+    work = len(links.weights) + iterated_modification.OVERHEAD * links.number
+    assert 2 <= calls["find_exchanges"] <= 200_000_000 / (3 * 42**2 * work)
+    assert 1 <= calls["relax"] <= 200_000_000 / (RELAXED_STATES * work)
+    assert found.cost <= redeploy(case.move, case.W, case.mu, "one-edge", case.tree).cost
+    assert found.cost < 5.0 * found.lower_bound
+
+
+@given(LARGER, st.integers(0, 8), st.booleans())
+def test_distant_nodes_bound_the_optimum(case: Case, number: int, idle: bool) -> None:
+    ends = list(case.ends) if idle else list(range(len(case.move)))
+    best = optimum(case, idle)
+    bound = bound_by_distant(scaled_links(case.W, case.mu), case.move, ends, number)
+    assert bound <= best
+    if number >= len(case.move) - 1 and not idle:
+        assert bound == best or bound > best - 1e-9
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_distant_nodes_bound_well(seed: int) -> None:
+    """Five of fourteen nodes that pay to move a long way already cost half as much as all of them."""
+    case = spread_case(14, seed, number=30)
+    links, everyone = scaled_links(case.W, case.mu), list(range(14))
+    best = optimum(case, idle=False)
+    bounds = [bound_by_distant(links, case.move, everyone, number) for number in (1, 4, 8)]
+    assert bounds == sorted(bounds)
+    assert 0.5 * best < bounds[1] <= bounds[2] <= best
+    kept = redeploy(case.move, case.W, case.mu, "fixed", case.tree)
+    assert kept.lower_bound >= bounds[1]
+
+
+@given(cases(nodes=(1, 7)), st.booleans())
+def test_a_topology_costs_what_its_placements_cost(case: Case, idle: bool) -> None:
+    ends = list(case.ends) if idle else list(range(len(case.move)))
+    cost = topology_cost(scaled_links(case.W, case.mu), case.move, np.array(case.tree, dtype=int).reshape(-1, 2), ends)
+    plain = redeploy(case.move, case.W, case.mu, "fixed", case.tree, case.ends, idle).cost
+    assert cost == plain or abs(cost - plain) < 1e-9
+
+
 def test_that_many_robots_cannot_help_is_proven() -> None:
     case = spread_case(16, seed=1)
     case.W[0, 1:] = case.W[1:, 0] = inf
@@ -197,6 +256,6 @@ def test_a_cost_below_the_bound_is_hidden_only_where_it_is_rounding() -> None:
 def test_a_local_optimum_is_one() -> None:
     case = spread_case(8, seed=3)
     links = scaled_links(case.W, case.mu)
-    found = improve(links, case.move, list(range(8)), np.array(case.tree))
+    found = improve(links, case.move, list(range(8)), np.array(case.tree), 100)[0]
     edges = [(int(i), int(j)) for i, j in found.edges]
     assert np.isclose(naive_one_edge(case.move, case.W, case.mu, edges), found.cost)
