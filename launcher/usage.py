@@ -55,7 +55,7 @@ def describe(problem: Any) -> str:
     is_option = parameter.param_type_name == "option"
     place = parameter.opts[-1] if is_option else metavar or parameter.name.upper()
     if problem.message == "":
-        return f"{context.info_name} needs {' '.join(dict.fromkeys((place, metavar))).strip()}; {asking}"
+        return f"{command.rpartition(' ')[2]} needs {' '.join(dict.fromkeys((place, metavar))).strip()}; {asking}"
     causes: list[dict[str, Any]] = getattr(problem.__cause__, "errors", list)()
     if not causes:
         return f"{place}: {problem.message.removesuffix('.')}; {asking}"
