@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -19,16 +18,34 @@ from planning.placement_graph import PlacementGraph
 from planning.redeployment import redeploy
 from planning.relays import fewest_relays, join_terminals
 from planning.steiner import Method, steiner_tree
-from planning.tree import NoTree, Tree
+from planning.tree import InvalidRequest, NoTree, Tree
 
 if TYPE_CHECKING:
+    from launcher.present_tree import Links
     from protocol.messages import Point
 
 Floats = NDArray[np.float64]
 
 
+EXACT_COUNT = 8
+"""Terminals up to which the fewest relays are counted exactly whatever the method: that takes milliseconds."""
+
+
 class NoPlan(ValueError):
     """There is no such plan; the text says what is in the way."""
+
+
+@dataclass(frozen=True)
+class Need:
+    """How many relays join all terminals.
+
+    Attributes:
+        relays: so many do.
+        least: and fewer do not.
+    """
+
+    relays: int
+    least: bool
 
 
 @dataclass(frozen=True)
@@ -51,7 +68,8 @@ class MovePlan:
     """Who goes where.
 
     Attributes:
-        targets: for each robot where it is to go; None for one that idles.
+        placements: for each robot the placement it is to go to; None for one that idles.
+        targets: where those are.
         links: the two ends of each line of sight.
         movement: what going there costs, in metres or seconds.
         virtual: what the links cost, without unit.
@@ -59,6 +77,7 @@ class MovePlan:
         lower_bound: no plan of this kind costs less; None where nothing is promised.
     """
 
+    placements: tuple[int | None, ...]
     targets: tuple[Point | None, ...]
     links: tuple[tuple[Point, Point], ...]
     movement: float
@@ -92,11 +111,21 @@ class Terminals:
         joined = np.isfinite(self.direct[0]) | (np.isfinite(self.links) & reached).any(axis=1)
         return [int(agent) for agent in np.flatnonzero(~joined[1:])]
 
-    def fewest_relays(self) -> int:
-        """How many robots it takes at least."""
-        seen, direct = np.isfinite(self.links), np.isfinite(self.direct)
-        np.fill_diagonal(direct, True)
-        return len(fewest_relays(self._graph.visible, seen, direct).relays)
+    def need(self, method: Method = "exact") -> Need:
+        """How many robots it takes: the least that do, or with many terminals what the method finds.
+
+        Raises:
+            NoPlan: too many terminals for an exact answer.
+        """
+        if method == "exact" or len(self.nodes) <= EXACT_COUNT:
+            seen, direct = np.isfinite(self.links), np.isfinite(self.direct)
+            np.fill_diagonal(direct, True)
+            try:
+                return Need(len(fewest_relays(self._graph.visible, seen, direct).relays), True)
+            except InvalidRequest as problem:
+                raise self._too_many("say --method takahashi-matsuyama or --method mst") from problem
+        tree = steiner_tree(np.where(np.isfinite(self.weights), 1.0, np.inf), self.nodes, method, None, self._standing)
+        return Need(int(np.count_nonzero(tree.nodes < len(self._graph))), False)
 
     def tree(self, method: Method = "exact", vertices: int | None = None, robots: int | None = None) -> TreePlan:
         """A tree of little cost that joins all terminals.
@@ -107,15 +136,29 @@ class Terminals:
             robots: at most so many of the nodes are robots.
 
         Raises:
-            NoPlan: there is none with so few nodes.
+            NoPlan: there is none of that size, or too many terminals for an exact one.
         """
         try:
-            tree = steiner_tree(self.weights, self.nodes, method, vertices, self._standing)
-            if vertices is None and robots is not None and len(tree.nodes) - len(self.nodes) > robots:
+            if vertices is not None:
+                remedy = "leave out --vertices, and say --method takahashi-matsuyama"
+                return self._ordered(steiner_tree(self.weights, self.nodes, "exact", vertices, self._standing))
+            remedy = "say --method takahashi-matsuyama or --method mst"
+            tree = steiner_tree(self.weights, self.nodes, method, None, self._standing)
+            count = len(tree.nodes) - len(self.nodes)
+            if robots is not None and count > robots:
+                remedy = f"give --robots {count}, which the tree by --method {method} takes, or move the agents"
                 tree = steiner_tree(self.weights, self.nodes, "exact", len(self.nodes) + robots, self._standing)
         except NoTree as problem:
             raise NoPlan(f"no tree joins the base station and all agents: {problem}") from problem
+        except InvalidRequest as problem:
+            raise self._too_many(remedy) from problem
         return self._ordered(tree)
+
+    def _too_many(self, remedy: str) -> NoPlan:
+        return NoPlan(
+            f"{len(self.nodes) - 1} agents and the base station on {len(self._graph)} placements are too many for an "
+            f"exact tree; {remedy}"
+        )
 
     def place_of(self, node: int) -> Point:
         """Where a node is."""
@@ -151,29 +194,37 @@ class Terminals:
             method: how the tree is found.
 
         Raises:
+            NoPlan: too many terminals for an exact tree.
             TooFewRobots: the tree needs more robots, or they cannot get there.
         """
-        tree = steiner_tree(self.weights, self.nodes, method, None, self._standing)
+        try:
+            tree = steiner_tree(self.weights, self.nodes, method, None, self._standing)
+        except InvalidRequest as problem:
+            raise self._too_many("say --method takahashi-matsuyama or --method mst") from problem
         relays = tree.nodes[tree.nodes < len(self._graph)]
         chosen = identify_robots(movement[:, relays])
-        targets: list[Point | None] = [None] * len(movement)
+        placements: list[int | None] = [None] * len(movement)
         for robot, node in zip(chosen, relays, strict=True):
-            targets[robot] = self.place_of(int(node))
+            placements[robot] = int(node)
         moved = float(movement[chosen, relays].sum())
-        return MovePlan(tuple(targets), self._ordered(tree).links, moved, tree.cost, moved + mu * tree.cost, None)
+        links, cost = self._ordered(tree).links, moved + mu * tree.cost
+        return MovePlan(tuple(placements), self._places_of(placements), links, moved, tree.cost, cost, None)
 
     def redeploy(
-        self, movement: Floats, mu: float, search: Literal["exact", "one-edge", "fixed", "chain"], idle: bool
+        self,
+        movement: Floats,
+        mu: float,
+        search: Literal["exact", "one-edge", "fixed", "chain"],
+        tree: Links,
+        idle: bool = False,
     ) -> MovePlan:
         """Who goes where at the least cost of moving and of links together.
-
-        The present topology, from which ``fixed`` and ``one-edge`` start, is a line: the base station, the robots in
-        their order, the first agent; further agents hang on the last robot.
 
         Args:
             movement: as for :meth:`assign`.
             mu: likewise.
             search: see :mod:`planning.redeployment`.
+            tree: the present topology, of nodes: the terminals, then the robots.
             idle: robots may be left out.
 
         Raises:
@@ -184,25 +235,30 @@ class Terminals:
         move = np.full((t + k, len(self.weights)), np.inf)
         move[np.arange(t), self.nodes] = 0.0
         move[t:, : len(self._graph)] = movement
-        line = [0, *range(t, t + k), 1]
-        tree = [*pairwise(line), *((line[-2], agent) for agent in range(2, t))]
         found = redeploy(move, self.weights, mu, search, tree, tuple(range(t)), idle)
         if found.tree is None:
-            remedy = "say --search exact" if search in ("one-edge", "fixed") else "give more of them, or more time"
+            remedy = "give more of them, or more time"
+            if search in ("one-edge", "fixed"):
+                remedy = "say --search exact, or tell the present tree by --link"
             raise NoPlan(
                 f"from where the {k} robots are, a '{search}' search joins not all agents to the base: {remedy}"
             )
-        places = [None if cell < 0 else self.place_of(int(cell)) for cell in found.cells]
+        cells = [None if cell < 0 else int(cell) for cell in found.cells]
+        places = self._places_of(cells)
         links = [(places[u], places[v]) for u, v in found.tree.tolist()]
         robots = np.flatnonzero(found.cells[t:] >= 0)
         moved = float(movement[robots, found.cells[t:][robots]].sum())
         ends = found.cells[found.tree]
         virtual = float(self.weights[ends[:, 0], ends[:, 1]].sum())
         return MovePlan(
-            tuple(places[t:]),
+            tuple(cells[t:]),
+            places[t:],
             tuple((here, there) for here, there in links if here is not None and there is not None),
             moved,
             virtual,
             found.cost,
             found.lower_bound,
         )
+
+    def _places_of(self, nodes: Sequence[int | None]) -> tuple[Point | None, ...]:
+        return tuple(None if node is None else self.place_of(node) for node in nodes)

@@ -39,6 +39,11 @@ _MOVE = "#5b4b8a"
 _IDLE = "#7a828c"
 
 
+_APART_PT = 11.0
+"""Between the centres of two markers."""
+_PUSHES = 100
+
+
 class BadPicture(ValueError):
     """A picture that cannot be written; the text says file, reason and remedy in one sentence."""
 
@@ -69,7 +74,7 @@ def draw_plan(
     file: Path,
     title: str,
     *,
-    robots: Sequence[tuple[Point, Point | None]] = (),
+    ways: Sequence[Sequence[Point]] = (),
 ) -> None:
     """Draw a deployment: who stands where, the lines of sight that join them, and how robots get there.
 
@@ -78,12 +83,15 @@ def draw_plan(
         polygons: cells, each (m, 2) float, metres; None draws none.
         base: where the base station stands.
         agents: where each tracked agent is.
-        relays: where each relay is to stand, numbered from 1 in this order; of ``robots`` the targets in their order.
+        relays: where each relay is to stand, numbered from 1 in this order; with ``ways`` their ends in their order.
         links: the two ends of each line of sight of the chain or tree.
         file: written as PNG, PDF or SVG, by its suffix.
         title: one line above the picture.
-        robots: where each robot is and where it is to go as a relay, or None if it idles; numbered from 1 in this
-            order, and the relays by their robots. None given: nothing is said of how relays get there.
+        ways: of each robot, from where it is to where it is to go as a relay; a single point for one that idles.
+            Robots are numbered from 1 in this order, and the relays by their robots. None given: nothing is said of how
+            relays get there.
+
+    Peers in one place are drawn beside each other, each joined to its place by a thin line.
 
     Raises:
         BadPicture: the file has another suffix or cannot be written.
@@ -93,20 +101,25 @@ def draw_plan(
     figure, axes = _draw_floor(environment, polygons, file, title)
     axes.add_collection(LineCollection(list(links), colors=_SIGHT, linewidths=2, zorder=4))
     axes.plot([], [], color=_SIGHT, linewidth=2, label="line of sight")
-    ways = {str(number): way for number, way in enumerate(robots, 1)}
-    for start, end in ((start, end) for start, end in ways.values() if end is not None):
-        axes.annotate(
-            "", end, start, zorder=4.5,
-            arrowprops={"arrowstyle": "-|>", "color": _MOVE, "linewidth": 1.2, "linestyle": "--", "shrinkB": 6},
-        )  # fmt: skip
-    if relays and robots:
-        axes.plot([], [], color=_MOVE, linewidth=1.2, linestyle="--", label="movement")
-    idle = {name: start for name, (start, end) in ways.items() if end is None}
-    _draw_peers(axes, list(idle.values()), "o", _IDLE, "idle", list(idle))
-    names = [name for name in ways if name not in idle] or [str(number) for number in range(1, len(relays) + 1)]
-    _draw_peers(axes, [base], "s", _BASE, "base", ["B"])
-    _draw_peers(axes, relays, "o", _RELAY, "relay", names)
-    _draw_peers(axes, agents, "D", _AGENT, "agent", ["A"] * len(agents))
+    _draw_ways(axes, [way for way in ways if len(way) > 1])
+    numbers = [str(number) for number in range(1, len(ways or relays) + 1)]
+    idle = {name: way[0] for name, way in zip(numbers, ways, strict=False) if len(way) == 1}
+    names = [name for name in numbers if name not in idle]
+    kinds = [
+        ("s", _BASE, "base", [base], ["B"]),
+        ("o", _RELAY, "relay", relays, names),
+        ("o", _IDLE, "idle", [*idle.values()], [*idle]),
+        ("D", _AGENT, "agent", agents, ["A"] * len(agents)),
+    ]
+    places = np.array([place for *_, these, _ in kinds for place in these], dtype=float)
+    shown = _spread(axes, places)
+    axes.add_collection(
+        LineCollection(list(np.stack([places, shown], axis=1)), colors=_WALL, linewidths=0.6, zorder=4.8)
+    )
+    begin = 0
+    for marker, colour, kind, these, labels in kinds:
+        _draw_peers(axes, shown[begin : begin + len(these)], marker, colour, kind, labels)
+        begin += len(these)
     axes.legend(
         loc="upper center", bbox_to_anchor=(0.5, -0.5 / figure.get_figheight()), ncols=6, frameon=False, fontsize=8
     )
@@ -154,18 +167,64 @@ def _draw_floor(
     return figure, axes
 
 
-def _draw_peers(
-    axes: Axes, places: Sequence[Point], marker: str, colour: str, kind: str, labels: Sequence[str]
-) -> None:
-    """Markers of one kind of peer, with a label each, and their entry in the legend."""
-    if not places:
+def _draw_ways(axes: Axes, ways: Sequence[Sequence[Point]]) -> None:
+    """Dashed lines, with a head at the end of each."""
+    from matplotlib.collections import LineCollection
+
+    if not ways:
         return
-    x, y = np.asarray(places, dtype=float).T
-    axes.plot(
-        x, y, marker, color=colour, markersize=10, markeredgecolor="white", markeredgewidth=1.2, label=kind, zorder=5
+    axes.add_collection(
+        LineCollection([way[:-1] for way in ways], colors=_MOVE, linewidths=1.2, linestyles="--", zorder=4.5)
     )
-    for place, label in zip(places, labels, strict=True):
-        axes.annotate(label, place, color="white", fontsize=7, weight="bold", ha="center", va="center", zorder=6)
+    for before, end in (way[-2:] for way in ways):
+        axes.annotate(
+            "", end, before, zorder=4.5,
+            arrowprops={
+                "arrowstyle": "-|>", "color": _MOVE, "linewidth": 1.2, "linestyle": "--", "shrinkA": 0, "shrinkB": 6
+            },
+        )  # fmt: skip
+    axes.plot(*np.array([way[0] for way in ways]).T, "o", color=_MOVE, markersize=4, zorder=4.5)
+    axes.plot([], [], color=_MOVE, linewidth=1.2, linestyle="--", label="movement")
+
+
+def _spread(axes: Axes, places: Floats) -> Floats:
+    """Where to draw markers (n, 2) so that none covers another: those too near push each other apart."""
+    scale = 72 / (_APART_PT * axes.figure.dpi)  # the unit is what two markers need
+    turns = 2.4 * np.arange(len(places))
+    # Markers in one place leave it in directions of their own.
+    shown = scale * axes.transData.transform(places) + 1e-3 * np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    pushed = np.zeros(len(places), dtype=np.bool_)
+    for _ in range(_PUSHES):
+        apart = shown[:, None] - shown
+        distances = np.linalg.norm(apart, axis=2)
+        np.fill_diagonal(distances, np.inf)
+        lacks = np.maximum(1.0 - distances, 0.0)
+        if lacks.max() < 1e-2:
+            break
+        near = np.maximum(np.count_nonzero(lacks, axis=1), 1)
+        shown += ((lacks / distances)[:, :, None] * apart).sum(axis=1) / (2 * near[:, None])
+        pushed |= lacks.any(axis=1)
+    return np.where(pushed[:, None], axes.transData.inverted().transform(shown / scale), places)
+
+
+def _draw_peers(axes: Axes, places: Floats, marker: str, colour: str, kind: str, labels: Sequence[str]) -> None:
+    """Markers (n, 2) of one kind of peer, with a label each, and their entry in the legend."""
+    if not len(places):
+        return
+    axes.plot(
+        *places.T,
+        marker,
+        color=colour,
+        markersize=10,
+        markeredgecolor="white",
+        markeredgewidth=1.2,
+        label=kind,
+        zorder=5,
+    )
+    for (x, y), label in zip(places, labels, strict=True):
+        axes.annotate(
+            label, (x, y), color="white", fontsize=7, weight="bold", ha="center", va="center_baseline", zorder=6
+        )
 
 
 def _write(figure: Figure, file: Path) -> None:

@@ -7,14 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from launcher.placements import PlacementOptions
+from launcher.present_tree import Links, line_up
 from launcher.scenario import ScenarioFault
 from launcher.wording import counted
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from launcher.offline_plan import MovePlan, Terminals
+    from launcher.offline_plan import MovePlan, Need, Terminals
+    from launcher.ways import Line
     from planning.decomposition import Cells
     from planning.placement_graph import PlacementGraph
     from protocol.messages import Point
@@ -38,6 +37,8 @@ class Moves:
     speed_m_s: float | None = None
     deadline_s: float | None = None
     idle: bool = False
+    links: Links = ()
+    """The present tree, of nodes as in :mod:`launcher.present_tree`; none: not known."""
 
     def check(self, agents: int) -> None:
         """Raise where options contradict each other.
@@ -51,6 +52,10 @@ class Moves:
             raise ScenarioFault("--deadline needs to know how fast robots are: give --speed, too")
         if self.jump_penalty_m and self.movement != "adjacency":
             raise ScenarioFault("--jump-penalty is of paths through adjacent cells: say --movement adjacency")
+        if self.links and self.search in ("tree", "chain"):
+            raise ScenarioFault(
+                f"--search {self.search} looks at no present tree: leave out --link, or say --search one-edge"
+            )
         if self.search == "chain" and agents > 1:
             raise ScenarioFault(
                 f"--search chain joins one agent, and there are {agents}: say --search exact, with --idle if "
@@ -90,68 +95,72 @@ class Request:
             raise ScenarioFault("--movement adjacency leads through cells: say --placements cells, too")
 
 
-def check_robots(request: Request, needed: int) -> None:
-    """Raise where there are too few robots.
+def check_robots(request: Request, need: Need) -> None:
+    """Raise where there are certainly too few robots.
 
     Args:
         request: what is asked.
-        needed: how many robots the terminals need at least.
+        need: how many robots the terminals need.
 
     Raises:
         ScenarioFault: one sentence.
     """
-    agents = len(request.agents)
+    if not need.least:
+        return
+    needed, agents = need.relays, len(request.agents)
     who = f"the agent at {request.agents[0][0]:g},{request.agents[0][1]:g} needs"
     if agents > 1:
         who = f"the {agents} agents need"
-    need = f"{request.file}: {who} {counted(needed, 'robot')}, and"
+    lack = f"{request.file}: {who} {counted(needed, 'robot')}, and"
     if request.robots is not None and request.robots < needed:
-        raise ScenarioFault(f"{need} --robots says {request.robots}; give at least {needed}, or move the agents")
+        raise ScenarioFault(f"{lack} --robots says {request.robots}; give at least {needed}, or move the agents")
     if request.vertices is not None and request.vertices < 1 + agents + needed:
         raise ScenarioFault(
-            f"{need} of --vertices {request.vertices} only {max(0, request.vertices - 1 - agents)} can be robots; give "
+            f"{lack} of --vertices {request.vertices} only {max(0, request.vertices - 1 - agents)} can be robots; give "
             f"at least {1 + agents + needed}, or move the agents"
         )
     if 0 < len(request.moves.robots) < needed:
         raise ScenarioFault(
-            f"{need} --robot was given {counted(len(request.moves.robots), 'time')}; give at least {needed}, or move "
+            f"{lack} --robot was given {counted(len(request.moves.robots), 'time')}; give at least {needed}, or move "
             "the agents"
         )
 
 
+def present_tree(request: Request) -> Links | None:
+    """The tree that the search starts from; None where it starts from none."""
+    if request.moves.search in ("tree", "chain"):
+        return None
+    return request.moves.links or line_up(len(request.agents), len(request.moves.robots))
+
+
 def send_robots(
-    moves: Moves, terminals: Terminals, graph: PlacementGraph, cells: Cells | None, method: Method
-) -> MovePlan:
-    """Who goes where.
+    request: Request, terminals: Terminals, graph: PlacementGraph, cells: Cells | None
+) -> tuple[MovePlan, tuple[Line, ...]]:
+    """Who goes where, and along which way; of a robot that idles the way is the place where it is.
 
     Args:
-        moves: how; with robots.
+        request: with robots.
         terminals: base station and agents on the placements.
         graph: the placements.
         cells: which they stand for, if they do.
-        method: of the tree, where that is made first.
 
     Raises:
         ValueError: one sentence, where these robots cannot do it.
     """
+    from launcher.ways import Ways
     from planning.physical_weights import arrival_times
 
-    costs = _lengths(moves, graph, cells)
+    moves = request.moves
+    ways = Ways(moves.robots, graph, moves.movement, cells, moves.jump_penalty_m)
+    costs = ways.lengths()
     if moves.speed_m_s is not None:
         costs = arrival_times(costs, moves.speed_m_s, float("inf") if moves.deadline_s is None else moves.deadline_s)
     if moves.search == "tree":
-        return terminals.assign(costs, moves.mu, method)
-    return terminals.redeploy(costs, moves.mu, moves.search, moves.idle)
-
-
-def _lengths(moves: Moves, graph: PlacementGraph, cells: Cells | None) -> NDArray[np.float64]:
-    """How far robots have to go to each placement: (k, N) float, metres."""
-    from planning.adjacency_path import AdjacencyPaths
-    from planning.physical_weights import adjacency_path_weights, euclidean_weights, geodesic_weights
-
-    if moves.movement == "adjacency" and cells is not None:
-        paths = AdjacencyPaths(cells, graph.free, moves.jump_penalty_m)
-        return adjacency_path_weights(paths, moves.robots)[:, graph.cells]
-    if moves.movement == "euclidean":
-        return euclidean_weights(moves.robots, graph.positions)
-    return geodesic_weights(graph.geodesics, moves.robots, graph.positions)
+        plan = terminals.assign(costs, moves.mu, request.method)
+    else:
+        plan = terminals.redeploy(costs, moves.mu, moves.search, present_tree(request) or (), moves.idle)
+    lines = [
+        (start,) if placement is None else ways.line(robot, placement)
+        for robot, (start, placement) in enumerate(zip(moves.robots, plan.placements, strict=True))
+    ]
+    return plan, tuple(lines)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from launcher.commands.plan_answer import draw, find_crowds, tell_moves, tell_tree
 from launcher.commands.plan_options import (
     LARGEST_M,
     AsJson,
@@ -19,18 +20,17 @@ from launcher.commands.plan_options import (
     check_picture,
     sayer,
 )
-from launcher.console import LONGEST_S, busy, check_option, plainly, print_json, read_point, tell
+from launcher.console import LONGEST_S, busy, check_option, plainly, print_json, read_point
 from launcher.placements import PlacementOptions, Weighting, place
-from launcher.plan_request import Method, Movement, Moves, Request, Search, check_robots, send_robots
+from launcher.plan_request import Method, Movement, Moves, Request, Search, check_robots, present_tree, send_robots
+from launcher.present_tree import name_links, read_links
 from launcher.scenario import MOST_ROBOTS, ScenarioFault, find_map
-from launcher.wording import counted
 
 if TYPE_CHECKING:
-    from launcher.offline_plan import MovePlan, TreePlan
+    from launcher.offline_plan import Terminals
     from planning.decomposition import Cells
     from planning.edge_weights import RobotPenalty
-    from planning.environment import Environment
-    from protocol.messages import Point
+    from planning.placement_graph import PlacementGraph
 
 GREATEST = 1e9
 """Of any coefficient."""
@@ -86,6 +86,15 @@ def plan(
             rich_help_panel=_MOVES,
         ),
     ] = "exact",
+    link: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="A-B",
+            help="A link of the present tree, between base, agent (agent1, agent2 ...) and robots by number, such as "
+            "base-1; may be repeated. None: a line from the base by all robots in their order to the agent.",
+            rich_help_panel=_MOVES,
+        ),
+    ] = None,
     mu: Annotated[float, typer.Option(help="What links count beside movement.", rich_help_panel=_MOVES)] = 1.0,
     movement: Annotated[
         Movement, typer.Option(help="Round walls, straight, or by adjacent cells.", rich_help_panel=_MOVES)
@@ -121,6 +130,7 @@ def plan(
         starts = tuple(read_point(text, "--robot") for text in robot or ())
         check_option("the number of --robot", len(starts), 0, MOST_ROBOTS)
         weighting = Weighting(weights, distance_weight, area_weight, area_cost, _read_penalty(robot_penalty))
+        present = read_links(link, len(agent), len(starts), idle) if link else ()
         request = Request(
             find_map(name, Path()),
             read_point(base, "--base"),
@@ -129,7 +139,7 @@ def plan(
             robots,
             method,
             vertices,
-            Moves(starts, search, mu, movement, jump_penalty_m, speed_m_s, deadline_s, idle),
+            Moves(starts, search, mu, movement, jump_penalty_m, speed_m_s, deadline_s, idle, present),
             tolerance_m,
         )
         request.check()
@@ -170,10 +180,10 @@ def _answer(request: Request, picture: Path | None, as_json: bool) -> None:
     for robot in request.moves.robots:
         ground.check_walk("--radius", {"--robot": robot}, options.radius_m, request.base, "--base")
     ground.room("--radius", options.radius_m, request.base, "--base")
-    from launcher.offline_plan import Terminals
-
     with busy("Planning ..."):
         graph, cells = place(file, ground.environment, options, request.base, say)
+        from launcher.offline_plan import NoPlan, Terminals
+
         terminals = Terminals(graph, [request.base, *request.agents])
         if lost := terminals.unreachable():
             x, y = request.agents[lost[0]]
@@ -181,126 +191,64 @@ def _answer(request: Request, picture: Path | None, as_json: bool) -> None:
                 f"{file}: no chain of robots joins --agent {x:g},{y:g} to --base; move it, make --radius smaller, or "
                 "choose other placements"
             )
-        needed = terminals.fewest_relays()
-        check_robots(request, needed)
-        facts = {
-            "map": str(file),
-            "base": request.base,
-            "agents": list(request.agents),
-            "placements": options.kind,
-            "decomposition": options.decomposition if options.kind == "cells" else None,
-            "robot_radius_m": options.radius_m,
-            "relays_needed": needed,
-            "most_relays_needed": max(0, int(graph.relays_from(request.base).max()) - 1),
-        }
-        if request.moves.robots:
-            moved = send_robots(request.moves, terminals, graph, cells, request.method)
-        else:
-            tree = terminals.tree(request.method, request.vertices, request.robots)
-    if request.moves.robots:
-        _tell_moves(request, facts, moved, ground.environment, cells, picture, as_json)
-    else:
-        _tell_tree(request, facts, tree, ground.environment, cells, picture, as_json)
-
-
-def _tell_tree(
-    request: Request,
-    facts: dict[str, Any],
-    tree: TreePlan,
-    environment: Environment,
-    cells: Cells | None,
-    picture: Path | None,
-    as_json: bool,
-) -> None:
-    count = len(tree.relays)
-    spares = None if request.robots is None else request.robots - count
-    _draw(request, environment, cells, picture, f"{counted(count, 'relay')}", tree.relays, tree.links)
-    if as_json:
-        print_json({**facts, "relays": tree.relays, "links": tree.links, "cost": tree.cost, "spares": spares})
-        return
-    spare = "" if spares is None else f", {spares} to spare"
-    tell(f"{_count(count, facts)}{spare}; virtual cost {tree.cost:.3f}")
-    relays = [(f"relay {number}", place) for number, place in enumerate(tree.relays, 1)]
-    _tell_places([("base", request.base), *relays, *_named_agents(request)])
-    _tell_most(facts, picture)
-
-
-def _tell_moves(
-    request: Request,
-    facts: dict[str, Any],
-    moved: MovePlan,
-    environment: Environment,
-    cells: Cells | None,
-    picture: Path | None,
-    as_json: bool,
-) -> None:
-    moves = request.moves
-    unit = "m" if moves.speed_m_s is None else "s"
-    targets = [target for target in moved.targets if target is not None]
-    ways = list(zip(moves.robots, moved.targets, strict=True))
-    idle = len(ways) - len(targets)
-    title = f"{moves.search}: {counted(len(targets), 'relay')}, {idle} idle, cost {moved.cost:.2f}"
-    _draw(request, environment, cells, picture, title, targets, moved.links, ways)
-    if as_json:
-        robots = [{"from": start, "to": end} for start, end in ways]
-        costs = {"movement": moved.movement, "virtual": moved.virtual, "cost": moved.cost}
-        bound = {"mu": moves.mu, "unit": unit, "lower_bound": moved.lower_bound, "search": moves.search}
-        print_json({**facts, "robots": robots, "relays": targets, "links": moved.links, **costs, **bound})
-        return
-    tell(
-        f"{_count(len(targets), facts)}, {idle} idle; cost "
-        f"{moved.cost:.3f} = movement {moved.movement:.3f} {unit} + {moves.mu:g} × virtual cost {moved.virtual:.3f}"
-    )
-    if moved.lower_bound is not None:
-        gap = moved.cost - moved.lower_bound
-        proof = "which is the least there can be" if gap <= 1e-9 * moved.cost else "which no plan goes below"
-        tell(f"  bound     {moved.lower_bound:.3f}, {proof}")
-    _tell_places([("base", request.base), *_named_agents(request)])
-    for number, (start, end) in enumerate(ways, 1):
-        where = "idles" if end is None else f"to {end[0]:8.3f}, {end[1]:8.3f}"
-        tell(f"  robot {number:<3} {start[0]:8.3f}, {start[1]:8.3f}  {where}")
-    _tell_most(facts, picture)
-
-
-def _count(relays: int, facts: dict[str, Any]) -> str:
-    """How many relays, and how many would do."""
-    needed = facts["relays_needed"]
-    return counted(relays, "relay") + ("" if relays == needed else f" ({needed} would do)")
-
-
-def _named_agents(request: Request) -> list[tuple[str, Point]]:
-    if len(request.agents) == 1:
-        return [("agent", request.agents[0])]
-    return [(f"agent {number}", place) for number, place in enumerate(request.agents, 1)]
-
-
-def _tell_places(places: Sequence[tuple[str, Point]]) -> None:
-    for title, (x, y) in places:
-        tell(f"  {title:9} {x:8.3f}, {y:8.3f}")
-
-
-def _tell_most(facts: dict[str, Any], picture: Path | None) -> None:
-    most = counted(facts["most_relays_needed"], "relay")
-    tell(f"An agent at any of the {facts['placements']} needs at most {most} from this base station.")
+        try:
+            facts = _find(request, terminals, graph, cells)
+        except NoPlan as problem:
+            raise ScenarioFault(f"{file}: {problem}") from problem
     if picture is not None:
-        tell(f"Picture: {picture}")
+        draw(request, facts, ground.environment, None if cells is None else cells.polygons, picture)
+    if as_json:
+        print_json(facts)
+    else:
+        (tell_moves if request.moves.robots else tell_tree)(request, facts, picture)
 
 
-def _draw(
-    request: Request,
-    environment: Environment,
-    cells: Cells | None,
-    picture: Path | None,
-    title: str,
-    relays: Sequence[Point],
-    links: Sequence[tuple[Point, Point]],
-    robots: Sequence[tuple[Point, Point | None]] = (),
-) -> None:
-    if picture is None:
-        return
-    from launcher.picture import draw_plan
+def _find(request: Request, terminals: Terminals, graph: PlacementGraph, cells: Cells | None) -> dict[str, Any]:
+    """The plan, as it is written for programs."""
+    from launcher.offline_plan import NoPlan
 
-    draw_plan(
-        environment, None if cells is None else cells.polygons, request.base, request.agents, relays, links, picture,
-        f"{environment.name or request.file.stem}: {title}", robots=robots,
-    )  # fmt: skip
+    moves, options = request.moves, request.placements
+    try:
+        need = terminals.need(request.method)
+    except NoPlan:
+        # Where a tree is not made by this method, another refuses or does without: the count is no reason to.
+        if request.vertices is None and (not moves.robots or moves.search == "tree"):
+            raise
+        need = terminals.need("takahashi-matsuyama")
+    check_robots(request, need)
+    facts: dict[str, Any] = {
+        "map": str(request.file),
+        "base": request.base,
+        "agents": list(request.agents),
+        "placements": options.kind,
+        "decomposition": options.decomposition if options.kind == "cells" else None,
+        "robot_radius_m": options.radius_m,
+        "relays_needed": need.relays,
+        "relays_needed_is_least": need.least,
+        "most_relays_needed": max(0, int(graph.relays_from(request.base).max()) - 1),
+    }
+    if not moves.robots:
+        tree = terminals.tree(request.method, request.vertices, request.robots)
+        facts |= asdict(tree)
+        facts["spares"] = None if request.robots is None else request.robots - len(tree.relays)
+    else:
+        plan, ways = send_robots(request, terminals, graph, cells)
+        present = present_tree(request)
+        facts |= {
+            "robots": [
+                {"from": start, "to": end, "way": way}
+                for start, end, way in zip(moves.robots, plan.targets, ways, strict=True)
+            ],
+            "relays": [target for target in plan.targets if target is not None],
+            "links": plan.links,
+            "movement": plan.movement,
+            "virtual": plan.virtual,
+            "cost": plan.cost,
+            "mu": moves.mu,
+            "unit": "m" if moves.speed_m_s is None else "s",
+            "lower_bound": plan.lower_bound,
+            "search": moves.search,
+            "present_tree": None if present is None else name_links(present, len(request.agents), len(moves.robots)),
+        }
+    facts["crowds"] = find_crowds(request, facts)
+    return facts

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from itertools import product
+from itertools import combinations, pairwise, product
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,8 @@ ROOM3 = ["plan", "room3", "--base", "10,36", "--agent", "70,10"]
 TWO = [*ROOM3, "--agent", "30,45"]
 STARTS = [(12.0, 36.0), (31.0, 33.0), (35.0, 15.0), (60.0, 6.0)]
 ROBOTS = [word for x, y in STARTS for word in ("--robot", f"{x},{y}")]
+LINE = [word for link in ("base-1", "1-2", "2-3", "3-4", "4-agent") for word in ("--link", link)]
+MANY = [word for x, y in product((6, 10, 14, 27, 35), (32, 35, 40, 44, 48)) for word in ("--agent", f"{x},{y}")]
 
 
 def sightline(*arguments: str) -> Result:
@@ -177,6 +179,12 @@ def test_speed_makes_seconds_of_metres_and_a_deadline_forbids() -> None:
         (["--placements", "cells", "--max-bitangent", "5"], "say --decomposition aspect"),
         (["--agent", "0,0"], "--agent [0, 0] is inside a wall"),
         (["--agent", "30,45", *ROBOTS, "--search", "fixed"], "say --search exact"),
+        (["--link", "base-agent"], "give --robot X,Y"),
+        ([*ROBOTS, "--link", "base-5"], "--link: 'base-5' is no link; write A-B with two of base, agent, 1, 2, 3, 4"),
+        ([*ROBOTS, *LINE, "--link", "1-agent"], "--link 1-agent joins what is joined already"),
+        ([*ROBOTS, *LINE[2:]], "no --link joins agent to the base station"),
+        ([*ROBOTS, *LINE[:-2]], "no --link joins agent to the base station"),
+        ([*ROBOTS, *LINE, "--search", "chain"], "leave out --link, or say --search one-edge"),
     ],
 )
 def test_what_cannot_be_planned_is_refused_in_a_sentence(options: list[str], words: str) -> None:
@@ -245,3 +253,93 @@ def test_pictures_show_movement_and_idle_robots(tmp_path: Path) -> None:
     assert "<!-- idle -->" in moving
     assert "<!-- idle -->" not in still
     assert np.array_equal([text.count("<!-- line of sight -->") for text in (still, moving)], [1, 1])
+
+
+def test_the_present_tree_is_the_one_that_is_given() -> None:
+    line, given, crossed = (
+        answer(*ROOM3, *ROBOTS, "--search", "fixed", *links)
+        for links in (
+            [],
+            LINE,
+            [word for link in ("base-4", "4-3", "3-2", "2-1", "1-agent") for word in ("--link", link)],
+        )
+    )
+    assert line["present_tree"] == ["base-1", "1-2", "2-3", "3-4", "4-agent"]
+    assert given == line
+    assert crossed["present_tree"] == ["base-4", "4-3", "3-2", "2-1", "1-agent"]
+    assert crossed["cost"] > line["cost"]
+    places = [crossed["base"], *(robot["to"] for robot in reversed(crossed["robots"])), crossed["agents"][0]]
+    assert crossed["links"] == [list(link) for link in pairwise(places)]
+    assumed, told = (sightline(*ROOM3, *ROBOTS, "--search", "one-edge", *links).stdout for links in ([], LINE))
+    assert "base-1 1-2 2-3 3-4 4-agent, taken for the present tree; give --link for another" in assumed
+    assert "base-1 1-2 2-3 3-4 4-agent\n" in told
+
+
+def test_links_name_agents_by_number_and_leave_out_robots_that_may_idle() -> None:
+    links = [word for link in ("base-2", "2-3", "3-agent1", "2-agent2") for word in ("--link", link)]
+    refused = sightline(*TWO, *ROBOTS, *links, "--search", "one-edge")
+    assert "no --link joins 1 to the base station" in refused.stderr
+    plan = answer(*TWO, *ROBOTS, *links, "--search", "one-edge", "--idle")
+    check_tree(plan)
+    assert plan["present_tree"] == ["base-2", "2-3", "3-agent1", "2-agent2"]
+
+
+@pytest.mark.parametrize("movement", ["geodesic", "euclidean", "adjacency"])
+def test_ways_lead_where_robots_go_and_are_as_long_as_they_cost(movement: str, tmp_path: Path) -> None:
+    starts = [word for x in (12, 13, 14, 15, 16) for word in ("--robot", f"{x},36")]
+    arguments = [*ROOM3, *starts, "--placements", "cells", "--movement", movement, "--picture", str(tmp_path / "p.png")]
+    plan = answer(*arguments)
+    free = Environment.load(plan["map"]).inflated(plan["robot_radius_m"]).polygon.buffer(1e-6)
+    total = 0.0
+    for robot in plan["robots"]:
+        way = shapely.LineString(robot["way"])
+        total += way.length
+        assert robot["way"][0] == robot["from"]
+        assert robot["way"][-1] == pytest.approx(robot["to"])
+        assert movement == "euclidean" or shapely.covers(free, way)
+    if movement == "adjacency":  # which costs from stop to stop of cells, straight
+        assert total > plan["movement"]
+    else:
+        assert total == pytest.approx(plan["movement"])
+
+
+def test_robots_that_would_stand_in_one_place_are_told() -> None:
+    robots = [*ROBOTS, "--robot", "62,6", "--robot", "63,7"]
+    plan = answer(*ROOM3, *robots, "--mu", "50")
+    close = {
+        frozenset((f"robot {i + 1}", f"robot {j + 1}"))
+        for i, one in enumerate(plan["robots"])
+        for j, other in enumerate(plan["robots"][:i])
+        if math.dist(one["to"], other["to"]) < 0.4
+    }
+    assert close
+    assert {frozenset(pair) for crowd in plan["crowds"] for pair in combinations(crowd, 2)} == close
+    assert "Too near: robot" in sightline(*ROOM3, *robots, "--mu", "50").stdout
+    assert answer(*ROOM3)["crowds"] == []
+
+
+def test_relays_in_one_place_take_one_line() -> None:
+    result = sightline(*ROOM3, "--vertices", "80")
+    assert "and the next " in result.stdout
+    assert result.stdout.count("\n") < 15
+
+
+def test_many_agents_are_joined_as_the_refusal_advises() -> None:
+    arguments = ["plan", "room3", "--base", "10,36", *MANY, "--agent", "70,10"]
+    refused = sightline(*arguments)
+    assert refused.exit_code == 2
+    assert "room3.json: 26 agents and the base station on" in refused.stderr
+    assert "say --method takahashi-matsuyama or --method mst" in refused.stderr
+    for method in ("takahashi-matsuyama", "mst"):
+        plan = answer(*arguments, "--method", method)
+        check_tree(plan)
+        assert not plan["relays_needed_is_least"]
+        enough = answer(*arguments, "--method", method, "--robots", str(len(plan["relays"])))
+        assert enough["spares"] == 0
+    assert "the least is not known" in sightline(*arguments, "--method", "mst").stdout
+    few = sightline(*arguments, "--method", "mst", "--robots", "1")
+    assert few.exit_code == 2
+    assert f"give --robots {len(plan['relays'])}" in few.stderr
+    size = sightline(*arguments, "--vertices", "40")
+    assert size.exit_code == 2
+    assert "leave out --vertices, and say --method takahashi-matsuyama" in size.stderr
