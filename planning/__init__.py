@@ -14,12 +14,14 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from planning.adjacency_path import AdjacencyPaths
     from planning.certificate import Certificate, certify
+    from planning.chain import Chain, chain_between, cheapest_chain
     from planning.compiled_map import CompiledMap
     from planning.decomposition import Cells, decompose
-    from planning.deployment import Deployment
-    from planning.deployment_sequence import DeploymentSequence, identify_sequence, physical_cost
+    from planning.deployment import Deployment, identify_robots, shortest_path_deployment
+    from planning.deployment_sequence import DeploymentSequence, identify_deployment, identify_sequence, physical_cost
     from planning.edge_weights import virtual_weights
     from planning.environment import Environment
+    from planning.forecast import forecast_cells
     from planning.geodesic import GeodesicMap
     from planning.motion_plan import Schedule, TimedPath
     from planning.mutual_visibility import mutual_visibility
@@ -32,6 +34,8 @@ if TYPE_CHECKING:
     )
     from planning.placement_graph import PlacementGraph
     from planning.redeployment import Redeployment, redeploy
+    from planning.relays import MostRelays, RelayTree, fewest_relays, most_relays
+    from planning.shortest_paths import all_pairs, from_source
     from planning.steiner import steiner_tree
     from planning.tree import Tree
 
@@ -39,27 +43,40 @@ __all__ = [
     "AdjacencyPaths",
     "Cells",
     "Certificate",
+    "Chain",
     "CompiledMap",
     "Deployment",
     "DeploymentSequence",
     "Environment",
     "GeodesicMap",
+    "MostRelays",
     "PlacementGraph",
     "Redeployment",
+    "RelayTree",
     "Schedule",
     "TimedPath",
     "Tree",
     "adjacency_path_weights",
+    "all_pairs",
     "arrival_times",
     "bounded_weights",
     "certify",
+    "chain_between",
+    "cheapest_chain",
     "decompose",
     "euclidean_weights",
+    "fewest_relays",
+    "forecast_cells",
+    "from_source",
     "geodesic_weights",
+    "identify_deployment",
+    "identify_robots",
     "identify_sequence",
+    "most_relays",
     "mutual_visibility",
     "physical_cost",
     "redeploy",
+    "shortest_path_deployment",
     "steiner_tree",
     "virtual_weights",
 ]
@@ -68,27 +85,40 @@ _HOMES = {
     "AdjacencyPaths": "planning.adjacency_path",
     "Cells": "planning.decomposition",
     "Certificate": "planning.certificate",
+    "Chain": "planning.chain",
     "CompiledMap": "planning.compiled_map",
     "Deployment": "planning.deployment",
     "DeploymentSequence": "planning.deployment_sequence",
     "Environment": "planning.environment",
     "GeodesicMap": "planning.geodesic",
+    "MostRelays": "planning.relays",
     "PlacementGraph": "planning.placement_graph",
     "Redeployment": "planning.redeployment",
+    "RelayTree": "planning.relays",
     "Schedule": "planning.motion_plan",
     "TimedPath": "planning.motion_plan",
     "Tree": "planning.tree",
     "adjacency_path_weights": "planning.physical_weights",
+    "all_pairs": "planning.shortest_paths",
     "arrival_times": "planning.physical_weights",
     "bounded_weights": "planning.physical_weights",
     "certify": "planning.certificate",
+    "chain_between": "planning.chain",
+    "cheapest_chain": "planning.chain",
     "decompose": "planning.decomposition",
     "euclidean_weights": "planning.physical_weights",
+    "fewest_relays": "planning.relays",
+    "forecast_cells": "planning.forecast",
+    "from_source": "planning.shortest_paths",
     "geodesic_weights": "planning.physical_weights",
+    "identify_deployment": "planning.deployment_sequence",
+    "identify_robots": "planning.deployment",
     "identify_sequence": "planning.deployment_sequence",
+    "most_relays": "planning.relays",
     "mutual_visibility": "planning.mutual_visibility",
     "physical_cost": "planning.deployment_sequence",
     "redeploy": "planning.redeployment",
+    "shortest_path_deployment": "planning.deployment",
     "steiner_tree": "planning.steiner",
     "virtual_weights": "planning.edge_weights",
 }

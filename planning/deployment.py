@@ -189,37 +189,6 @@ def shortest_path_deployment(
     return Deployment(nodes, tuple(pairwise(nodes)), tuple(cells), relays)
 
 
-def relays_needed(
-    W: NDArray[np.float64], base_cell: int, placements: NDArray[np.bool_] | None = None
-) -> NDArray[np.int32]:
-    """The fewest relays of a chain from the base station to an agent in each cell.
-
-    The greatest of them is what the map can ask for: the eccentricity of the base's cell, less one.
-
-    Args:
-        W: (N, N) float as in :func:`shortest_path_deployment`; only whether a weight is finite matters.
-        base_cell: cell of the base station.
-        placements: (N,) bool: cells that a relay can stand in. None: all.
-
-    Returns:
-        (N,) int32; :data:`NO_CHAIN` for cells that no chain reaches.
-
-    Complexity: O(N²), breadth first.
-    """
-    _check_cells(len(W), base_cell)
-    visible = np.isfinite(W)
-    usable = np.ones(len(W), dtype=np.bool_) if placements is None else np.asarray(placements, dtype=np.bool_)
-    needed = np.full(len(W), NO_CHAIN, dtype=np.int32)
-    needed[base_cell] = 0
-    frontier = visible[base_cell] & (needed == NO_CHAIN)
-    relays = 0
-    while frontier.any():
-        needed[frontier] = relays
-        relays += 1
-        frontier = visible[frontier & usable].any(axis=0) & (needed == NO_CHAIN)
-    return needed
-
-
 def identify_robots(costs: NDArray[np.float64]) -> NDArray[np.int64]:
     """Which robot goes to which place, so that the costs add up to the least (thesis §3.4, optimal identification).
 

@@ -33,6 +33,7 @@ from planning.geodesic_table import GeodesicTable
 from planning.placement import reachable_positions
 from planning.placement_points import choose_points, choose_spacing
 from planning.placement_sight import CellSight, PointSight, Sight
+from planning.relays import count_links
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -212,14 +213,8 @@ class PlacementGraph:
 
         1 where the point is seen; :data:`NO_CHAIN` where no chain leads. O(N²), breadth first.
         """
-        relays = np.full(len(self), NO_CHAIN)
-        frontier = self.sees(point)
-        number = 0
-        while frontier.any():
-            number += 1
-            relays[frontier] = number
-            frontier = self.visible[frontier].any(axis=0) & (relays == NO_CHAIN)
-        return relays
+        links = count_links(self.visible, self.sees(point))
+        return np.where(links < 0, NO_CHAIN, links + 1)
 
     @property
     def probes(self) -> Floats:

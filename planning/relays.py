@@ -77,7 +77,7 @@ def most_relays(visible: Bools) -> MostRelays:
             return MostRelays(max(greatest - 1, 0), ends, parts)
         source = int(np.argmax(upper) if from_far else np.argmin(np.where(unsure, lower, n)))
         from_far = not from_far
-        hops = _count_hops(rows, n, source)
+        hops = _count_hops(rows, n, np.array([source]))
         reached = hops >= 0
         parts += not met[source]
         met |= reached
@@ -87,6 +87,21 @@ def most_relays(visible: Bools) -> MostRelays:
         lower = np.where(reached, np.maximum(lower, np.maximum(hops, eccentricity - hops)), lower)
         upper = np.where(reached, np.minimum(upper, hops + eccentricity), upper)
         upper[source] = eccentricity
+
+
+def count_links(visible: Bools, sources: Bools) -> Ints:
+    """The fewest links from any of some nodes to each node, breadth first.
+
+    Args:
+        visible: (N, N) bool, symmetric.
+        sources: (N,) bool.
+
+    Returns:
+        (N,) int: 0 for the sources, -1 where no links lead.
+
+    Complexity: O(N²).
+    """
+    return _count_hops(_pack(visible), len(visible), np.flatnonzero(sources))
 
 
 def join_terminals(W: Floats, links: Floats, direct: Floats) -> Floats:
@@ -135,10 +150,9 @@ def _pack(visible: Bools) -> Words:
     return wide.view(np.uint64)
 
 
-def _count_hops(rows: Words, n: int, source: int) -> Ints:
-    """Links from a node to each of the n nodes, -1 where none lead: (n,) int. Breadth first, 64 nodes at a time."""
+def _count_hops(rows: Words, n: int, frontier: Ints) -> Ints:
+    """Links from the nodes of a frontier to each of n, -1 where none lead: (n,) int. Breadth first, 64 at a time."""
     hops = np.full(n, -1)
-    frontier = np.array([source])
     number = 0
     while frontier.size:
         hops[frontier] = number

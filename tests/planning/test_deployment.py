@@ -12,13 +12,11 @@ from numpy.typing import NDArray
 
 from planning.deployment import (
     IDLE,
-    NO_CHAIN,
     Deployment,
     InvalidDeployment,
     NoChain,
     TooFewRobots,
     identify_robots,
-    relays_needed,
     shortest_path_deployment,
 )
 from planning.tree import Tree
@@ -64,21 +62,6 @@ def test_chain_is_the_shortest_path_through_placements(seed: int) -> None:
         assert found.edges == tuple(pairwise(found.nodes))
         cell = dict(zip(found.nodes, found.cells, strict=True))
         assert found.virtual_cost(W) == pytest.approx(sum(W[cell[a], cell[b]] for a, b in found.edges))
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_fewest_relays_are_the_hops_of_a_breadth_first_search(seed: int) -> None:
-    W, placements = _graph(seed)
-    base = seed
-    needed = relays_needed(W, base, placements)
-    for agent in range(len(W)):
-        graph = _through(W, placements, base, agent)
-        if agent == base:
-            assert needed[agent] == 0
-        elif nx.has_path(graph, base, agent):
-            assert needed[agent] == nx.shortest_path_length(graph, base, agent) - 1
-        else:
-            assert needed[agent] == NO_CHAIN
 
 
 def test_no_relay_within_one_cell() -> None:

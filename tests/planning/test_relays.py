@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 import maps
 from planning.decomposition import decompose
-from planning.deployment import NO_CHAIN, relays_needed
+from planning.deployment import NO_CHAIN
 from planning.environment import Environment
 from planning.mutual_visibility import mutual_visibility
 from planning.placement_graph import PlacementGraph
-from planning.relays import fewest_relays, join_terminals, most_relays
+from planning.relays import count_links, fewest_relays, join_terminals, most_relays
 from planning.tree import NoTree
 from tests.planning.polygons import free_points
 
@@ -55,8 +55,21 @@ def test_what_the_maps_ask_for(name: str, over_cells: int, over_points: int) -> 
     graph = PlacementGraph.from_cells(cells, mutual_visibility(cells), environment, 0.2)
     most = most_relays(graph.visible)
     assert (most.relays, most.parts) == (over_cells, 1)
-    assert max(int(relays_needed(graph.weights, v).max()) for v in range(len(graph))) == over_cells
+    farthest = [count_links(graph.visible, one).max() for one in np.eye(len(graph), dtype=np.bool_)]
+    assert max(farthest) == over_cells + 1
     assert most_relays(points_of(name).visible).relays == over_points
+
+
+@given(n=st.integers(1, 90), degree=st.floats(0.3, 6.0), share=st.floats(0.0, 0.3), seed=st.integers(0, 10_000))
+@settings(max_examples=50)
+def test_links_are_counted_from_the_nearest_source(n: int, degree: float, share: float, seed: int) -> None:
+    visible = graph_of(n, degree / n, seed)
+    sources = np.random.default_rng(seed).random(n) < share
+    graph = nx.from_numpy_array(visible)
+    graph.add_node("all sources")
+    graph.add_edges_from(("all sources", int(source)) for source in np.flatnonzero(sources))
+    hops = nx.single_source_shortest_path_length(graph, "all sources")
+    assert count_links(visible, sources).tolist() == [hops.get(v, 0) - 1 for v in range(n)]
 
 
 @pytest.mark.parametrize("name", ["room3", "l457"])
