@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from agents.base_station import BaseStation
@@ -11,8 +12,9 @@ from agents.mission import Mission
 from agents.robot import Robot
 from agents.role import Role
 from agents.tracked_agent import TrackedAgent
+from planning.compiled_map import CompiledMap
 from planning.environment import Environment
-from planning.geodesic import GeodesicMap
+from planning.inflation import NothingLeft
 from protocol.messages import Point
 
 if TYPE_CHECKING:
@@ -35,8 +37,7 @@ class Casting:
         self._mission = mission
         self._environment = environment
         self._known_planner = planner
-        self._inflated: list[tuple[float, Environment]] = []
-        self._routes: list[tuple[Environment, GeodesicMap]] = []
+        self._spaces: list[CompiledMap] = []
 
     def cast(self, name: str) -> tuple[Role, DiscDriver]:
         """Role and body of a peer.
@@ -51,12 +52,12 @@ class Casting:
                 return BaseStation(mission, self._environment, self.planner()), DiscDriver(entry.start, 0.0)
             case "tracked_agent":
                 radius_m, speed_m_s = mission.agent_radius_m, mission.agent_speed_m_s
-                free = self._free(radius_m, entry.start)
-                role: Role = TrackedAgent(mission, free, self._geodesics(free), begin(mission, free))
+                space = self._space(radius_m, entry.start)
+                role: Role = TrackedAgent(mission, space.free, space.geodesics, begin(mission, space.free))
             case "robot":
                 radius_m, speed_m_s = mission.robot_radius_m, mission.robot_speed_m_s
-                role = Robot(mission, name, self._geodesics(self._free(radius_m, entry.start)))
-        room = self._free(max(radius_m - CLEARANCE_M, 0.0), entry.start)
+                role = Robot(mission, name, self._space(radius_m, entry.start).geodesics)
+        room = self._space(max(radius_m - CLEARANCE_M, 0.0), entry.start).free
         return role, DiscDriver(entry.start, speed_m_s, room)
 
     def planner(self) -> DeploymentPlanner:
@@ -87,19 +88,20 @@ class Casting:
             agent_speed_m_s=mission.agent_speed_m_s,
         )
 
-    def _free(self, radius_m: float, start: Point) -> Environment:
-        """The map inflated by a radius; the component that holds the start."""
-        for known_radius_m, free in self._inflated:
-            if known_radius_m == radius_m and free.contains([start])[0]:
-                return free
-        free = self._environment.inflated(radius_m, containing=start)
-        self._inflated.append((radius_m, free))
-        return free
+    def _space(self, radius_m: float, start: Point) -> CompiledMap:
+        """Where a disc of this radius can go from its start, compiled.
 
-    def _geodesics(self, free: Environment) -> GeodesicMap:
-        for known, routes in self._routes:
-            if known is free:
-                return routes
-        routes = GeodesicMap(free)
-        self._routes.append((free, routes))
-        return routes
+        Where the base station's part of the map holds the start too, it is that one, which is then kept for the team
+        and not for every start.
+        """
+        for known in self._spaces:
+            if known.radius_m == radius_m and known.free.contains([start])[0]:
+                return known
+        space = CompiledMap(self._environment, radius_m=radius_m, containing=self._mission.base_station.start)
+        with suppress(NothingLeft):
+            if space.free.contains([start])[0]:
+                self._spaces.append(space)
+                return space
+        space = CompiledMap(self._environment, radius_m=radius_m, containing=start)
+        self._spaces.append(space)
+        return space

@@ -26,12 +26,12 @@ from numpy.typing import NDArray
 from agents.outlook import Outlook
 from agents.proposals import PREVIEWS_M, Proposal, Proposer, name_place, relays_in_words
 from agents.spares import Waiting
-from planning.decomposition import Kind, decompose
+from planning.compiled_map import CompiledMap
+from planning.decomposition import Kind
 from planning.deployment import NO_CHAIN, NoChain
 from planning.environment import Environment
 from planning.foresight import walk
-from planning.mutual_visibility import mutual_visibility
-from planning.placement_graph import PlacementGraph
+from planning.mutual_visibility import TooManyCells
 from planning.redeployment import Search
 from protocol.messages import Placement, Point
 
@@ -42,12 +42,8 @@ PlacementKind: TypeAlias = Literal["cells", "points"]
 KEEPING_S: Final = 0.3
 """Another proposal than the standing chain must be worth so many seconds more."""
 
-MOST_CELLS: Final = 6000
-"""More cells take too much memory, and minutes of preparation."""
-
-
-class TooManyCells(ValueError):
-    """The decomposition of this map is too fine to plan on; the text says how fine, and the remedy."""
+MOST_TO_PLAN_ON: Final = 6000
+"""More cells take gigabytes in the leader, and seconds a plan."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +70,7 @@ class Plan:
 class DeploymentPlanner:
     """Plans deployments between a fixed base station and one agent.
 
-    Built once for a mission; every answer is a function of its arguments alone.
+    Built once for a mission, of a compiled map; every answer is a function of its arguments alone.
 
     Args:
         environment: the map as drawn; robots see through it.
@@ -92,7 +88,7 @@ class DeploymentPlanner:
 
     Raises:
         NoChain: the base station is outside the map.
-        TooManyCells: the map has more than :data:`MOST_CELLS`.
+        TooManyCells: the map has more than :data:`MOST_TO_PLAN_ON`.
         UnfitSpacing: of the grid of points.
         ValueError: the map has no room for such robots around the base station.
     """
@@ -104,7 +100,7 @@ class DeploymentPlanner:
         robot_radius_m: float,
         decomposition: Kind,
         *,
-        placements: PlacementKind = "cells",
+        placements: PlacementKind = "points",
         search: Search = "chain",
         spacing_m: float | None = None,
         base_name: str = "base",
@@ -117,10 +113,10 @@ class DeploymentPlanner:
         self._environment, self._base = environment, base
         self._base_name, self._agent_name = base_name, agent_name
         self._robot_speed_m_s, self._agent_speed_m_s = robot_speed_m_s, agent_speed_m_s
-        if placements == "points":
-            self.graph = PlacementGraph.from_points(environment, robot_radius_m, spacing_m, containing=base)
-        else:
-            self.graph = _graph_of_cells(environment, base, robot_radius_m, decomposition)
+        compiled = CompiledMap(environment, decomposition, robot_radius_m, containing=base)
+        if placements == "cells":
+            _check_number(compiled)
+        self.graph = compiled.point_placements(spacing_m) if placements == "points" else compiled.cell_placements
         self._geodesics = self.graph.geodesics
         self._waiting = Waiting(self._geodesics, robot_radius_m)
         self._proposer = Proposer(
@@ -228,12 +224,16 @@ class DeploymentPlanner:
         return float(x), float(y)
 
 
-def _graph_of_cells(environment: Environment, base: Point, robot_radius_m: float, kind: Kind) -> PlacementGraph:
-    cells = decompose(environment, kind)
-    if len(cells) > MOST_CELLS:
-        remedy = "use inflection cells" if kind == "aspect" else "simplify it, a grid by a larger tolerance"
+def _check_number(compiled: CompiledMap) -> None:
+    """Raise TooManyCells before it is asked which of them see each other."""
+    name, kind, number = compiled.environment.name, compiled.kind, len(compiled.cells)
+    if number > MOST_TO_PLAN_ON:
         raise TooManyCells(
-            f"map {environment.name!r} has {len(cells)} {kind} cells, and at most {MOST_CELLS} can be planned on: "
-            f"{remedy}, or use placements on points"
+            f"map {name!r} has {number} {kind} cells, and at most {MOST_TO_PLAN_ON} can be planned on: "
+            f"{remedy_for(kind)}, or use placements on points"
         )
-    return PlacementGraph.from_cells(cells, mutual_visibility(cells), environment, robot_radius_m, containing=base)
+
+
+def remedy_for(kind: Kind) -> str:
+    """What makes fewer cells of a kind."""
+    return "use inflection cells" if kind == "aspect" else "simplify it, a grid by a larger tolerance"

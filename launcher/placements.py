@@ -66,32 +66,31 @@ def place(
     options: PlacementOptions,
     containing: Point | None,
     announce: Callable[[str], None],
-    cells: Cells | None = None,
 ) -> tuple[PlacementGraph, Cells | None]:
-    """The placements, and the cells that they stand for; None for points.
+    """The placements, and the cells that they stand for; None for points. Compiled before or now (`CompiledMap`).
 
     Args:
         file: of the map, for faults.
         environment: the map.
         options: checked.
         containing: robots are in the part of the map at this point; None: in the largest.
-        announce: is told beforehand of what takes long.
-        cells: those that the options ask for, if they are there already.
+        announce: is told beforehand of what takes long, and of what cannot be kept for the next time.
 
     Raises:
         ScenarioFault: more cells than a mutual visibility graph is made for.
         ValueError: another sentence, where robots of this radius have no room.
     """
-    from planning.placement_graph import PlacementGraph
+    from planning.compiled_map import CompiledMap
 
+    compiled = CompiledMap(
+        environment, options.decomposition, options.radius_m, options.max_bitangent_m,
+        containing=containing, announce=announce,
+    )  # fmt: skip
     if options.kind == "points":
-        return (
-            PlacementGraph.from_points(environment, options.radius_m, options.spacing_m, containing=containing),
-            None,
-        )
-    from planning.decomposition import decompose
+        return compiled.point_placements(options.spacing_m), None
     from planning.forecast import forecast_cells
-    from planning.mutual_visibility import MOST_CELLS, mutual_visibility
+    from planning.mutual_visibility import MOST_CELLS
+    from planning.placement_graph import PlacementGraph
 
     forecast = forecast_cells(environment, options.decomposition, options.max_bitangent_m)
     if forecast.cells > MOST_CELLS:
@@ -101,17 +100,17 @@ def place(
         )
     if forecast.seconds > LONG_S:
         announce(f"{price(forecast)} ...")
-    cells = cells or decompose(environment, options.decomposition, options.max_bitangent_m)
-    seen = mutual_visibility(cells)
     weighting = options.weighting
+    if weighting == Weighting():
+        return compiled.cell_placements, compiled.cells
     weights = virtual_weights(
-        cells, seen, form=weighting.form, distance_weight=weighting.distance_weight,
+        compiled.cells, compiled.seen, form=weighting.form, distance_weight=weighting.distance_weight,
         area_weight=weighting.area_weight, area_cost=weighting.area_cost, robot_penalty=weighting.robot_penalty,
     )  # fmt: skip
     graph = PlacementGraph.from_cells(
-        cells, seen, environment, options.radius_m, weights=weights, containing=containing
+        compiled.cells, compiled.seen, environment, options.radius_m, weights=weights, containing=containing
     )
-    return graph, cells
+    return graph, compiled.cells
 
 
 def price(forecast: Forecast) -> str:

@@ -26,7 +26,6 @@ from launcher.scenario import find_map
 from launcher.wording import counted
 
 if TYPE_CHECKING:
-    from planning.decomposition import Cells
     from planning.environment import Environment
     from planning.forecast import Forecast
 
@@ -105,7 +104,7 @@ def _describe(
     environment = load_map(file, file, None, tolerance_m)
     say = sayer(as_json)
     warm_up(say, ["planning"])
-    from planning.decomposition import decompose
+    from planning.compiled_map import CompiledMap
     from planning.forecast import forecast_cells
 
     kind = options.decomposition
@@ -127,13 +126,13 @@ def _describe(
     cells = None
     if forecast.decomposition_s <= patience_s:
         with busy("Decomposing ..."):
-            cells = decompose(environment, kind, options.max_bitangent_m)
+            cells = CompiledMap(environment, kind, max_bitangent_m=options.max_bitangent_m, announce=say).cells
         facts["cells"] = len(cells)
         facts["counts"] = {key: int(value) for key, value in cells.counts.items()}
     facts["robots"] = {
         "radius_m": options.radius_m,
-        "cells": _left_out(forecast, patience_s) or _robots(file, environment, options, cells, say),
-        "points": _robots(file, environment, replace(options, kind="points"), None, say),
+        "cells": _left_out(forecast, patience_s) or _robots(file, environment, options, say),
+        "points": _robots(file, environment, replace(options, kind="points"), say),
     }
     if picture is not None:
         from launcher.picture import draw_map
@@ -159,7 +158,7 @@ def _left_out(forecast: Forecast, patience_s: float) -> dict[str, Any] | None:
 
 
 def _robots(
-    file: Path, environment: Environment, options: PlacementOptions, cells: Cells | None, say: Callable[[str], None]
+    file: Path, environment: Environment, options: PlacementOptions, say: Callable[[str], None]
 ) -> dict[str, Any]:
     """What two placements ask for at most, or why that is not said."""
     from planning.inflation import NothingLeft
@@ -168,7 +167,7 @@ def _robots(
 
     try:
         with busy("Looking who sees whom ..."):
-            graph, _ = place(file, environment, options, None, say, cells)
+            graph, _ = place(file, environment, options, None, say)
             most = most_relays(graph.visible)
     except (NothingLeft, NoPlacement) as problem:
         return {"left_out": str(problem)}

@@ -13,13 +13,13 @@ import pytest
 
 import agents.leader
 import maps
-from agents.leader import DeploymentPlanner, Plan, TooManyCells
+from agents.leader import DeploymentPlanner, Plan
 from planning.decomposition import decompose
 from planning.deployment import NoChain
 from planning.environment import Environment
 from planning.foresight import chain_holds, walk
 from planning.geodesic import GeodesicMap
-from planning.mutual_visibility import mutual_visibility
+from planning.mutual_visibility import TooManyCells, mutual_visibility
 from planning.placement import reachable_positions
 from protocol.messages import Point
 
@@ -34,7 +34,9 @@ def office() -> Environment:
 
 @pytest.fixture(scope="module")
 def planner(office: Environment) -> DeploymentPlanner:
-    return DeploymentPlanner(office, BASE, RADIUS_M, "inflection", base_name="home", agent_name="visitor")
+    return DeploymentPlanner(
+        office, BASE, RADIUS_M, "inflection", placements="cells", base_name="home", agent_name="visitor"
+    )
 
 
 def _places(environment: Environment, number: int, seed: int) -> list[Point]:
@@ -167,9 +169,9 @@ def test_equal_questions_have_equal_answers(office: Environment) -> None:
 
 
 def test_a_decomposition_too_fine_to_plan_on_is_refused(office: Environment, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(agents.leader, "MOST_CELLS", 10)
+    monkeypatch.setattr(agents.leader, "MOST_TO_PLAN_ON", 10)
     with pytest.raises(TooManyCells, match="146 inflection cells, and at most 10"):
-        DeploymentPlanner(office, BASE, RADIUS_M, "inflection")
+        DeploymentPlanner(office, BASE, RADIUS_M, "inflection", placements="cells")
 
 
 @pytest.mark.parametrize("spares", [0, 2])
