@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from agents.casting import Casting
-from agents.leader import DeploymentPlanner, TooManyCells
+from agents.leader import MOST_TO_PLAN_ON, DeploymentPlanner, remedy_for
 from agents.mission import Behaviour, Mission, OnDemand, RosterEntry, Scripted, Wandering
 from launcher.ground import Ground, named
 from launcher.kernels import warm_up
@@ -20,6 +20,8 @@ from launcher.scenario import Scenario, ScenarioFault, find_map, read_scenario
 from launcher.wording import counted, text_of
 from planning.deployment import NoChain
 from planning.environment import Environment
+from planning.forecast import forecast_cells
+from planning.mutual_visibility import TooManyCells
 from planning.placement_points import UnfitSpacing
 from protocol.messages import Point
 
@@ -73,6 +75,8 @@ def prepare(file: Path, announce: Callable[[str], None]) -> Preparation:
     mission = _mission(scenario, starts)
     if len(environment.vertices) > LARGE:
         announce(f"Preparing the planner for a map of {len(environment.vertices)} vertices ...")
+    if mission.placements == "cells":
+        _check_cells(file, mission, environment)
     try:
         planner = Casting(mission, environment).planner()
     except TooManyCells as problem:
@@ -81,6 +85,16 @@ def prepare(file: Path, announce: Callable[[str], None]) -> Preparation:
         raise ScenarioFault(f"{file}: planning.spacing_m: {problem}") from problem
     warnings = _check_robots_suffice(file, scenario, planner)
     return Preparation(scenario, environment, mission, planner, warnings)
+
+
+def _check_cells(file: Path, mission: Mission, environment: Environment) -> None:
+    """Raise where cells will be too many, before minutes are spent on them."""
+    cells = forecast_cells(environment, mission.decomposition).cells
+    if cells > MOST_TO_PLAN_ON:
+        raise ScenarioFault(
+            f"{file}: map: {environment.name!r} has about {cells:,} {mission.decomposition} cells, and at most "
+            f"{MOST_TO_PLAN_ON:,} can be planned on: {remedy_for(mission.decomposition)}, or use placements on points"
+        )
 
 
 def _automatic_starts(ground: Ground, scenario: Scenario) -> tuple[Point, ...]:

@@ -218,11 +218,25 @@ def test_a_base_in_a_smaller_part_of_a_grid_is_where_the_mission_is(write: Write
 
 
 def test_too_many_cells_are_said_of_the_scenario(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("agents.leader.MOST_CELLS", 3)
+    monkeypatch.setattr("agents.leader.MOST_TO_PLAN_ON", 3)
     file = write(GOOD + CELLS)
-    with pytest.raises(ScenarioFault, match=r"cells") as caught:
+    with pytest.raises(
+        ScenarioFault, match=r"inflection cells, and at most 3 .* or use placements on points"
+    ) as caught:
         prepared(file)
     assert str(caught.value).startswith(f"{file}: map: ")
+
+
+def test_cells_that_would_be_too_many_are_not_made(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise AssertionError("decomposed")
+
+    monkeypatch.setattr("planning.compiled_map.decompose", refuse)
+    text = GOOD.replace("rooms.json", "cityblocks").replace("[1.0, 1.0]", "[10, 10]").replace("[3, 3]", "[12, 10]")
+    text = text.replace('"script"', '"wander"').replace("goals =", "#")
+    file = write(text + CELLS + 'decomposition = "aspect"\n')
+    with pytest.raises(ScenarioFault, match=r"map: 'cityblocks' has about 4\d,\d{3} aspect cells, .* use inflection"):
+        prepared(file)
 
 
 def test_a_grid_too_fine_is_said_of_the_scenario(write: Write) -> None:
