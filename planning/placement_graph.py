@@ -34,6 +34,7 @@ from planning.placement import reachable_positions
 from planning.placement_points import choose_points, choose_spacing
 from planning.placement_sight import CellSight, PointSight, Sight
 from planning.relays import count_links
+from planning.tree import InvalidWeights, checked_weights
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -109,6 +110,7 @@ class PlacementGraph:
         Raises:
             NothingLeft: there is no room for such a robot.
             NoPlacement: there is, but no cell reaches into it.
+            InvalidWeights: the weights are no symmetric matrix, or one for another number of cells.
 
         Complexity: O(N²) besides the inflation.
         """
@@ -117,7 +119,7 @@ class PlacementGraph:
         kept = np.flatnonzero(~np.isnan(positions[:, 0]))
         if len(kept) == 0:
             raise NoPlacement(f"a robot of radius {radius_m:g} m can stand in no cell of the map {environment.name!r}")
-        between = virtual_weights(cells, seen) if weights is None else np.asarray(weights, dtype=np.float64)
+        between = virtual_weights(cells, seen) if weights is None else _checked_between(weights, len(cells))
         among = np.ascontiguousarray(between[np.ix_(kept, kept)])
         return cls(
             "cells", environment, radius_m, free, positions[kept], np.isfinite(among), among, kept,
@@ -224,3 +226,14 @@ class PlacementGraph:
         ``free``, among which are the corners of rooms that are hardest to see into.
         """
         return self.sight.probes
+
+
+def _checked_between(weights: ArrayLike, number: int) -> Floats:
+    """Weights of the links between cells, 0 on the diagonal."""
+    between = checked_weights(weights).copy()
+    if len(between) != number:
+        raise InvalidWeights(
+            f"weights are for {len(between)} cells, but the map has {number}: give one row for each cell"
+        )
+    np.fill_diagonal(between, 0.0)
+    return between

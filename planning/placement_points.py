@@ -67,8 +67,8 @@ def choose_points(environment: Environment, free: Environment, spacing_m: float)
 
     Complexity: O(N² w) for w walls.
     """
-    if not 0.0 < spacing_m < math.inf:
-        raise UnfitSpacing(f"the spacing of placements is {spacing_m} m: give a finite length above 0")
+    if not (isinstance(spacing_m, int | float | np.number) and 0.0 < spacing_m < math.inf):
+        raise UnfitSpacing(f"the spacing of placements is {spacing_m!r}: give a finite number of metres above 0")
     corners = _thin(_middles_of_arcs(environment, free), CORNER_SHARE * spacing_m)
     expected = free.area / (HEXAGON * spacing_m**2) + len(corners)
     if expected > MOST:

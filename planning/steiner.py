@@ -77,6 +77,6 @@ def steiner_tree(
         return METHODS[method](weights, distance_network(weights, without_repetition(given)))
     if method != "exact":
         raise InvalidRequest(f"a tree with a given number of vertices is always exact: not {method!r}")
-    if not isinstance(vertices, int | np.integer):
+    if isinstance(vertices, bool) or not isinstance(vertices, int | np.integer):
         raise InvalidRequest(f"the number of vertices is a whole number, not {vertices!r}")
     return fixed_size_tree(weights, given, vertices, standing)

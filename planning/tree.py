@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +19,9 @@ from planning.kernel import kernel
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
+
+ROUNDING: Final = 1e-12
+"""Relative: weights of the two directions of a link that differ by no more are the same, summed in different orders."""
 
 TILE = 16
 """Rows and columns compared at once with their mirror image, so that both stay in the cache."""
@@ -55,7 +59,10 @@ def checked_weights(W: ArrayLike) -> Floats:
     """W as a C-contiguous (N, N) float array.
 
     Args:
-        W: (N, N), symmetric, not negative; inf where there is no link. The diagonal is not used.
+        W: (N, N), symmetric but for rounding, not negative; inf where there is no link. The diagonal is not used.
+
+    Returns:
+        W itself where it is such an array, else a copy; exactly symmetric, of two weights that differ the smaller.
 
     Raises:
         InvalidWeights: it is not.
@@ -71,7 +78,10 @@ def checked_weights(W: ArrayLike) -> Floats:
         raise InvalidWeights(f"edge weights form a square matrix, not one of shape {weights.shape}")
     if not _faults(weights):
         return weights
-    row, column = np.argwhere(~((weights >= 0) & (weights == weights.T)))[0]
+    faults = ~((weights >= 0) & (weights <= weights.T * (1.0 + ROUNDING)) & (weights * (1.0 + ROUNDING) >= weights.T))
+    if not faults.any():
+        return np.ascontiguousarray(np.minimum(weights, weights.T))
+    row, column = np.argwhere(faults)[0]
     weight, mirrored = weights[row, column], weights[column, row]
     if weight < 0:
         raise InvalidWeights(f"edge weights are not negative, but W[{row}, {column}] is {weight}")

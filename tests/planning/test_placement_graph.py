@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from functools import cache
 from itertools import pairwise
+from typing import Any
 
 import networkx as nx
 import numpy as np
@@ -24,6 +25,7 @@ from planning.inflation import NothingLeft
 from planning.mutual_visibility import mutual_visibility
 from planning.placement_graph import PlacementGraph
 from planning.placement_points import UnfitSpacing
+from planning.tree import InvalidWeights
 from tests.planning.polygons import covered_segments, environment_of, free_points
 
 RADIUS_M = 0.2
@@ -217,11 +219,22 @@ def test_a_convex_room_smaller_than_the_spacing_has_one_point() -> None:
 
 
 @pytest.mark.parametrize(
-    ("spacing_m", "said"), [(0.0, "above 0"), (math.nan, "above 0"), (0.05, "make it at least 0.")]
+    ("spacing_m", "said"),
+    [("a", "is 'a': give a finite number"), (0.0, "above 0"), (math.nan, "above 0"), (0.05, "make it at least 0.")],
 )
-def test_a_spacing_of_no_use_is_refused(spacing_m: float, said: str) -> None:
+def test_a_spacing_of_no_use_is_refused(spacing_m: Any, said: str) -> None:
     with pytest.raises(UnfitSpacing, match=said):
         PlacementGraph.from_points(Environment.load(maps.path("office")), 0.2, spacing_m)
+
+
+def test_weights_of_another_shape_are_refused() -> None:
+    environment = Environment.load(maps.path("office"))
+    cells = decompose(environment)
+    seen = mutual_visibility(cells)
+    with pytest.raises(InvalidWeights, match=f"weights are for 3 cells, but the map has {len(cells)}"):
+        PlacementGraph.from_cells(cells, seen, environment, RADIUS_M, weights=np.ones((3, 3)))
+    with pytest.raises(InvalidWeights, match=r"square matrix, not one of shape \(2, 3\)"):
+        PlacementGraph.from_cells(cells, seen, environment, RADIUS_M, weights=np.ones((2, 3)))
 
 
 def test_the_least_spacing_that_is_named_is_not_refused(monkeypatch: pytest.MonkeyPatch) -> None:

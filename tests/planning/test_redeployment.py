@@ -153,6 +153,8 @@ SQUARE = [(0, 1), (1, 2), (2, 3), (3, 0)]
         ({"move": np.zeros((3, 5))}, "move is for 5 placements and W for 2"),
         ({"mu": inf}, "mu is a finite number of at least 0, not inf"),
         ({"mu": -1.0}, "mu is a finite number"),
+        ({"mu": np.ones(2)}, "mu is a finite number"),
+        ({"mu": [[1.0], [1.0, 2.0]]}, "mu is a finite number"),
         ({"search": "best"}, "no search 'best': use one of exact, one-edge, fixed, chain"),
         ({"search": "fixed"}, "a fixed search starts from a topology: give tree"),
         ({"search": "one-edge"}, "a one-edge search starts from a topology: give tree"),
@@ -183,6 +185,13 @@ def test_what_makes_no_sense_is_said_in_a_sentence(arguments: dict[str, Any], sa
 def test_weights_that_are_not_symmetric_are_refused() -> None:
     with pytest.raises(InvalidWeights, match="symmetric"):
         redeploy(MOVE, [[0.0, 1.0], [2.0, 0.0]])
+
+
+def test_weights_that_are_symmetric_but_for_rounding_are_taken() -> None:
+    sums = np.array([[0.0, 0.1 + 0.2], [0.3, 0.0]])
+    move = [[0.0, inf], [inf, 0.0]]
+    assert redeploy(move, sums, mu=np.array(2.0)).cost == redeploy(move, sums.T, mu=2).cost == 0.6
+    assert sums[0, 1] != sums[1, 0]
 
 
 @settings(max_examples=30)

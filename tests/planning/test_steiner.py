@@ -145,6 +145,7 @@ def test_an_island_is_named() -> None:
         ([[0.0, -1.0], [-1.0, 0.0]], r"not negative, but W\[0, 1\] is -1"),
         ([[0.0, np.nan], [np.nan, 0.0]], r"numbers, but W\[0, 1\] is nan"),
         ([[-1.0, 1.0], [1.0, 0.0]], r"not negative, but W\[0, 0\]"),
+        ([[0.0, 1.0], [1.0 + 1e-9, 0.0]], r"symmetric, but W\[0, 1\] is 1.0"),
         ([[0.0, 1.0], [np.inf, 0.0]], r"symmetric, but W\[0, 1\] is 1.0 and W\[1, 0\] is inf"),
     ],
 )
@@ -180,6 +181,7 @@ def test_every_bad_weight_is_found_wherever_it_stands() -> None:
         ([0, 1], {"method": "mst", "vertices": 3}, "always exact"),
         ([0, 1], {"vertices": 1}, "1 nodes cannot hold 2 terminals"),
         ([0, 1], {"vertices": 2.5}, "whole number"),
+        ([0], {"vertices": True}, "whole number, not True"),
         ([0, 1], {"placements": [True]}, "4 times true or false"),
         ([0, 1], {"placements": [0, 1, 2, 3]}, "4 times true or false"),
     ],
