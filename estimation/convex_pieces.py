@@ -216,13 +216,18 @@ def merge(pieces: Floats, counts: Ints, checked: Floats, m: int, share: float, m
 
 @kernel
 def moments(pieces: Floats, counts: Ints) -> Floats:
-    """Sums over the pieces of ∫ of 1, x, y, x², xy, y² (6,), about the frame's origin."""
+    """Sums over the pieces of ∫ of 1, x, y, x², xy, y² (6,), about the first vertex of the first piece.
+
+    Not about the frame's origin: a target may have walked far from it, and second moments about a far point lose the
+    digits that a small set needs.
+    """
     total = np.zeros(6)
+    x0, y0 = pieces[0, 0]
     for piece in range(len(counts)):
         for i in range(2, counts[piece]):
-            ax, ay = pieces[piece, 0]
-            bx, by = pieces[piece, i - 1]
-            cx, cy = pieces[piece, i]
+            ax, ay = pieces[piece, 0, 0] - x0, pieces[piece, 0, 1] - y0
+            bx, by = pieces[piece, i - 1, 0] - x0, pieces[piece, i - 1, 1] - y0
+            cx, cy = pieces[piece, i, 0] - x0, pieces[piece, i, 1] - y0
             own = 0.5 * ((bx - ax) * (cy - ay) - (by - ay) * (cx - ax))
             sx, sy = ax + bx + cx, ay + by + cy
             total[0] += own

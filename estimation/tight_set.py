@@ -13,8 +13,9 @@ remembered with wider bounds.
 *How tight.* A target that stands: at most 1.1 times the true area after 5 to 40 ranges, 1.01 in the median, mirror
 images, slivers and far anchors included (tests). Beyond that are rings more than some 5000 times wider than thick,
 which the bounded number of pieces cannot follow round, and sets no wider than some micrometres, where the padding of
-the ranges decides. A target that moves: 1.02 times what exact growing and cutting would leave in the median, and up to
-1.1, since every step bounds the disc of the move by a polygon and may fuse neighbours.
+the ranges decides. A target that moves: 1.02 times what exact growing and cutting would leave in the median, since every
+step bounds the disc of the move by a polygon and may fuse neighbours; 1.08 in 99 of 100 sets, and 1.26 in the worst of
+4800 (160 runs). Most of that worst is pieces that overlap where no line parts them: their area counts twice.
 """
 
 from __future__ import annotations
@@ -47,6 +48,12 @@ MERGE_SHARE = 0.002
 
 MERGE_SHARE_MOVING = 0.006
 """The same after a move of the target, which blurs the set anyway."""
+
+MERGE_SHARE_WIDE = 0.02
+"""The same while a moving set is a ring yet, or much of one: more than `WIDE` pieces. Growing costs most there."""
+
+WIDE = 16
+"""Pieces from which a moving set counts as wide."""
 
 MOST_RELAXED = 64
 """Pieces of a set that some ranges may contradict: it is looser anyway, and as many times as costly."""
@@ -148,7 +155,7 @@ class _Polygons:
         annuli = held.annuli.copy()
         # An inner radius below 0 bounds nothing, as it should.
         annuli[:, 2:] += -distance_m, distance_m
-        return self._take(m, annuli, MERGE_SHARE_MOVING)
+        return self._take(m, annuli, MERGE_SHARE_MOVING if m <= WIDE else MERGE_SHARE_WIDE)
 
 
 class TightSet:
@@ -231,7 +238,7 @@ class TightSet:
     def centroid(self) -> Floats:
         """(2,) float, metres, map frame. Raises NothingMeasured before the first range."""
         total = self._moments
-        centroid: Floats = total[1:3] / total[0] + np.asarray(self._origin)
+        centroid: Floats = total[1:3] / total[0] + self._union.pieces[0, 0] + np.asarray(self._origin)
         return centroid
 
     @property

@@ -107,7 +107,7 @@ def test_the_exact_area_is_that_of_finely_drawn_rings() -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_at_most_a_tenth_too_large(kind: str) -> None:
     ratios = []
-    for seed in range(24):
+    for seed in range(16):
         rng = np.random.default_rng([seed, KINDS.index(kind)])
         epsilon = (0.5, 0.3, 0.1, 0.05)[seed % 4]
         target = rng.uniform(-10, 10, 2)
@@ -125,7 +125,7 @@ def test_at_most_a_tenth_too_large(kind: str) -> None:
                 # Of less than (30 µm)² neither the polygons nor the arcs are right to a tenth.
                 if truth > 1e-9:
                     ratios.append((held.area_m2 / truth, seed, k))
-    assert len(ratios) > 40
+    assert len(ratios) > 30
     # The arcs themselves are right to a thousandth.
     assert min(ratios)[0] > 0.999, min(ratios)
     assert max(ratios)[0] <= 1.1, max(ratios)
@@ -135,7 +135,7 @@ def test_at_most_a_tenth_too_large(kind: str) -> None:
 def test_of_a_moving_target_too(step_m: float) -> None:
     """Against finely drawn sets, grown by discs and cut by rings."""
     ratios = []
-    for seed in range(6):
+    for seed in range(16):
         rng = np.random.default_rng(seed)
         target = rng.uniform(-5, 5, 2)
         robots = target + rng.uniform(-20, 20, (1 + seed % 3, 2))
@@ -157,5 +157,6 @@ def test_of_a_moving_target_too(step_m: float) -> None:
             if k >= 5:
                 ratios.append(held.area_m2 / drawn.area)
     assert min(ratios) > 0.99
-    assert np.median(ratios) < 1.04, np.median(ratios)
-    assert max(ratios) < 1.15, max(ratios)
+    # The worst are pieces that overlap where no line parts them.
+    median, most, worst = np.quantile(ratios, [0.5, 0.99, 1.0])
+    assert median < 1.03 and most < 1.1 and worst < 1.3, (median, most, worst)

@@ -187,6 +187,21 @@ def test_moments_against_shapely_and_sampling() -> None:
     assert f.contains(far)
 
 
+def test_moments_of_a_small_set_far_from_its_first_range() -> None:
+    """The target has walked 500 km since: about the frame's origin, second moments come in steps of 2⁻¹⁴ m²."""
+    far = np.array([3e5, 4e5])
+    walked, fresh = TightSet(), TightSet()
+    walked.measure((0.0, 0.0), 5.0, 0.1)
+    walked.predict(6e5)
+    for held in (walked, fresh):
+        for anchor in ((-5.0, 0.0), (0.0, -5.0), (4.0, 3.0)):
+            held.measure(far + anchor, 5.0, 0.003)
+    assert walked.area_m2 == pytest.approx(fresh.area_m2, rel=0.1)
+    assert walked.covariance == pytest.approx(fresh.covariance, rel=0.2, abs=2e-7)
+    assert np.linalg.eigvalsh(walked.covariance)[0] > 0.0
+    assert walked.centroid == pytest.approx(far, abs=0.003)
+
+
 def test_reports_and_refusals() -> None:
     f = TightSet()
     f.predict(1.0)
