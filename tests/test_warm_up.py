@@ -29,7 +29,9 @@ from planning.decomposition import decompose
 from planning.edge_weights import virtual_weights
 from planning.mutual_visibility import mutual_visibility
 from planning.placement import reachable_positions
+from planning.redeployment import redeploy
 from planning.shortest_paths import all_pairs, from_source
+from planning.steiner import steiner_tree
 from agents.leader import DeploymentPlanner
 
 for name, kind in (("room1", "aspect"), ("room2", "aspect"), ("office", "inflection")):
@@ -51,6 +53,15 @@ for name, kind in (("room1", "aspect"), ("room2", "aspect"), ("office", "inflect
             plan = planner.plan(agent, (agent,), robots, None)
             planner.plan(agent, (agent,), robots, plan)
             planner.most_relays_needed()
+for method in ("exact", "mst", "takahashi-matsuyama"):
+    steiner_tree(weights, [0, 1, 2], method)
+steiner_tree(weights, [0, 1, 2], vertices=8)
+for number in (3, 9, 16):
+    move = np.random.default_rng(0).uniform(0.0, 5.0, (number, len(weights)))
+    tree = [(node, node + 1) for node in range(number - 1)]
+    for search in ("exact", "one-edge", "fixed", "chain"):
+        for idle in (False, True):
+            redeploy(move, weights, 1.0, search, tree, idle=idle)
 """
 
 
