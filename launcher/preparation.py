@@ -30,6 +30,9 @@ AGENT = "agent"
 GAP = 0.25
 """Automatic starts leave this share of a radius between two discs."""
 
+MOST_FOR_EXACT = 10
+"""More robots take the exact search half a second and more, see docs/scenario.md."""
+
 LARGE = 250
 """Vertices from which on a map takes more than a second to prepare for planning."""
 
@@ -83,7 +86,7 @@ def prepare(file: Path, announce: Callable[[str], None]) -> Preparation:
         raise ScenarioFault(f"{file}: map: {problem}") from problem
     except UnfitSpacing as problem:
         raise ScenarioFault(f"{file}: planning.spacing_m: {problem}") from problem
-    warnings = _check_robots_suffice(file, scenario, planner)
+    warnings = (*_check_robots_suffice(file, scenario, planner), *_check_pace(scenario))
     return Preparation(scenario, environment, mission, planner, warnings)
 
 
@@ -187,4 +190,15 @@ def _check_robots_suffice(file: Path, scenario: Scenario, planner: DeploymentPla
     return (
         f"some places of this map need {counted(most, 'robot')}, and there {'is' if count == 1 else 'are'} {count}: "
         "in those the chain will be broken",
+    )
+
+
+def _check_pace(scenario: Scenario) -> tuple[str, ...]:
+    """A warning where plans are slower than they are asked for."""
+    count, planning = scenario.robot_count, scenario.planning
+    if planning.search != "exact" or count <= MOST_FOR_EXACT or planning.period_s >= 1.0:
+        return ()
+    return (
+        f'planning.search = "exact" can take longer with {count} robots than planning.period_s = '
+        f'{planning.period_s:g} s, and the leader then plans less often; "chain" is quicker',
     )

@@ -253,6 +253,14 @@ def test_what_the_leader_plans_on_is_chosen_in_the_scenario(write: Write) -> Non
     assert prepared(write(GOOD + CELLS)).planner.graph.kind == "cells"
 
 
+def test_a_search_too_slow_for_the_period_is_warned_of(write: Write) -> None:
+    exact = '\n[planning]\nsearch = "exact"\n'
+    many = GOOD.replace("count = 3", "count = 11")
+    assert [warning for warning in prepared(write(many + exact)).warnings if "with 11 robots" in warning]
+    for text in (GOOD + exact, many, many + exact + "period_s = 1.0\n"):
+        assert not prepared(write(text)).warnings
+
+
 def test_robots_and_agent_may_stand_on_the_base(write: Write) -> None:
     text = GOOD.replace("count = 3", "starts = [[1.0, 1.0], [2, 2]]")
     assert prepared(write(text)).mission.robots[0].start == (1.0, 1.0)
