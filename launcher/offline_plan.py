@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.deployment import identify_robots
+from planning.deployment import TooFewRobots, identify_robots
 from planning.placement_graph import PlacementGraph
 from planning.redeployment import redeploy
 from planning.relays import fewest_relays, join_terminals
@@ -125,7 +125,8 @@ class Terminals:
             except InvalidRequest as problem:
                 raise self._too_many("say --method takahashi-matsuyama or --method mst") from problem
         tree = steiner_tree(np.where(np.isfinite(self.weights), 1.0, np.inf), self.nodes, method, None, self._standing)
-        return Need(int(np.count_nonzero(tree.nodes < len(self._graph))), False)
+        relays = int(np.count_nonzero(tree.nodes < len(self._graph)))
+        return Need(relays, relays == 0)
 
     def tree(self, method: Method = "exact", vertices: int | None = None, robots: int | None = None) -> TreePlan:
         """A tree of little cost that joins all terminals.
@@ -215,7 +216,7 @@ class Terminals:
         movement: Floats,
         mu: float,
         search: Literal["exact", "one-edge", "fixed", "chain"],
-        tree: Links,
+        tree: Links | None = None,
         idle: bool = False,
     ) -> MovePlan:
         """Who goes where at the least cost of moving and of links together.
@@ -224,7 +225,8 @@ class Terminals:
             movement: as for :meth:`assign`.
             mu: likewise.
             search: see :mod:`planning.redeployment`.
-            tree: the present topology, of nodes: the terminals, then the robots.
+            tree: the present topology, of nodes: the terminals, then the robots. None, of ``exact`` only: where that
+                cannot search everything, it starts from a tree that joins all terminals.
             idle: robots may be left out.
 
         Raises:
@@ -235,13 +237,16 @@ class Terminals:
         move = np.full((t + k, len(self.weights)), np.inf)
         move[np.arange(t), self.nodes] = 0.0
         move[t:, : len(self._graph)] = movement
+        if tree is None and search == "exact":
+            tree = self._joining_topology(movement)
         found = redeploy(move, self.weights, mu, search, tree, tuple(range(t)), idle)
         if found.tree is None:
             remedy = "give more of them, or more time"
             if search in ("one-edge", "fixed"):
                 remedy = "say --search exact, or tell the present tree by --link"
             raise NoPlan(
-                f"from where the {k} robots are, a '{search}' search joins not all agents to the base: {remedy}"
+                f"from where the {k} robots are, --search {search} finds no way to join all agents to the base; "
+                f"{remedy}"
             )
         cells = [None if cell < 0 else int(cell) for cell in found.cells]
         places = self._places_of(cells)
@@ -259,6 +264,23 @@ class Terminals:
             found.cost,
             found.lower_bound,
         )
+
+    def _joining_topology(self, movement: Floats) -> Links | None:
+        """A topology of terminals and robots that has placements, as far as robots get there in time; None: no such.
+
+        A tree of little cost, the robots nearest to its places, and the others beside the base station.
+        """
+        t, k = len(self.nodes), len(movement)
+        tree = steiner_tree(self.weights, self.nodes, "takahashi-matsuyama", None, self._standing)
+        relays = tree.nodes[tree.nodes < len(self._graph)]
+        try:
+            chosen = identify_robots(movement[:, relays])
+        except TooFewRobots:
+            return None
+        label = {int(node): terminal for terminal, node in enumerate(self.nodes)}
+        label |= {int(node): t + int(robot) for robot, node in zip(chosen, relays, strict=True)}
+        spare = sorted({*range(t, t + k)} - {*label.values()})
+        return (*((label[u], label[v]) for u, v in tree.edges.tolist()), *((0, robot) for robot in spare))
 
     def _places_of(self, nodes: Sequence[int | None]) -> tuple[Point | None, ...]:
         return tuple(None if node is None else self.place_of(node) for node in nodes)

@@ -127,10 +127,10 @@ def check_robots(request: Request, need: Need) -> None:
 
 
 def present_tree(request: Request) -> Links | None:
-    """The tree that the search starts from; None where it starts from none."""
-    if request.moves.search in ("tree", "chain"):
-        return None
-    return request.moves.links or line_up(len(request.agents), len(request.moves.robots))
+    """The tree that the search starts from; None where it needs none, and none is given."""
+    if request.moves.links or request.moves.search not in ("fixed", "one-edge"):
+        return request.moves.links or None
+    return line_up(len(request.agents), len(request.moves.robots))
 
 
 def send_robots(
@@ -158,7 +158,7 @@ def send_robots(
     if moves.search == "tree":
         plan = terminals.assign(costs, moves.mu, request.method)
     else:
-        plan = terminals.redeploy(costs, moves.mu, moves.search, present_tree(request) or (), moves.idle)
+        plan = terminals.redeploy(costs, moves.mu, moves.search, present_tree(request), moves.idle)
     lines = [
         (start,) if placement is None else ways.line(robot, placement)
         for robot, (start, placement) in enumerate(zip(moves.robots, plan.placements, strict=True))

@@ -60,14 +60,17 @@ def tell_moves(request: Request, facts: dict[str, Any], picture: Path | None) ->
     """Who goes where, and what that costs."""
     cost, bound = facts["cost"], facts["lower_bound"]
     idle = sum(robot["to"] is None for robot in facts["robots"])
+    spare = len(facts["relays"]) > facts["relays_needed"] and not request.moves.idle
+    hint = "; --idle leaves robots out" if spare and facts["search"] not in ("tree", "chain") else ""
     tell(
-        f"{_count(facts)}, {idle} idle; cost {cost:.3f} = movement {facts['movement']:.3f} {facts['unit']} + "
+        f"{_count(facts)}, {idle} idle{hint}; cost {cost:.3f} = movement {facts['movement']:.3f} {facts['unit']} + "
         f"{facts['mu']:g} × virtual cost {facts['virtual']:.3f}"
     )
     if bound is not None:
-        proof = "which is the least there can be" if cost - bound <= 1e-9 * cost else "which no plan goes below"
-        tell(f"  bound     {bound:.3f}, {proof}")
-    if facts["search"] in ("fixed", "one-edge"):
+        among = "" if request.moves.idle or facts["search"] == "chain" else " that leaves no robot out"
+        reached = "reached: this is the least" if cost - bound <= 1e-9 * cost else "not reached"
+        tell(f"  bound     {bound:.3f} for any plan{among}; {reached}")
+    if facts["present_tree"] is not None:
         assumed = "" if request.moves.links else ", taken for the present tree; give --link for another"
         tell(f"  from      {' '.join(facts['present_tree'])}{assumed}")
     _tell_places([("base", request.base), *_named_agents(request)])
@@ -132,6 +135,7 @@ def _tell_end(request: Request, facts: dict[str, Any], picture: Path | None) -> 
             f"{2 * request.placements.radius_m:g} m apart; let them stand beside each other."
         )
     most = counted(facts["most_relays_needed"], "relay")
-    tell(f"An agent at any of the {facts['placements']} needs at most {most} from this base station.")
+    elsewhere = "" if facts["placements"] == "cells" else ", elsewhere in their sight at most one more"
+    tell(f"An agent at any of the {facts['placements']} needs at most {most} from this base station{elsewhere}.")
     if picture is not None:
         tell(f"Picture: {picture}")

@@ -120,6 +120,7 @@ def plan(
         check_option("--vertices", vertices, 1, 2 * MOST_ROBOTS)
         check_option("--radius", radius_m, 0, LARGEST_M, "metres")
         check_option("--tolerance", tolerance_m, 0, LARGEST_M, "metres")
+        check_option("--spacing", spacing_m, 1e-3, GREATEST, "metres")
         check_option("--max-bitangent", max_bitangent_m, 1e-6, GREATEST, "metres")
         check_option("--distance-weight", distance_weight, 0, GREATEST)
         check_option("--area-weight", area_weight, 0, GREATEST)

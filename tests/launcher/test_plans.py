@@ -120,6 +120,17 @@ def test_searches_are_in_order_of_their_costs() -> None:
     assert any(robot["to"] is None for robot in idle["robots"])
 
 
+def test_words_say_what_the_bound_is_of_and_how_to_need_fewer() -> None:
+    whole, idle, chain = (
+        sightline(*ROOM3, *ROBOTS, *options).stdout for options in ([], ["--idle"], ["--search", "chain"])
+    )
+    assert "4 relays (3 would do), 0 idle; --idle leaves robots out; cost" in whole
+    assert "for any plan that leaves no robot out; reached: this is the least" in whole
+    for text in (idle, chain):
+        assert "leaves" not in text
+        assert "for any plan; reached: this is the least" in text
+
+
 def test_robots_take_the_places_that_are_nearest_together() -> None:
     """Identification: no other assignment of the robots to the places of the tree is shorter."""
     plan = answer(*ROOM3, *ROBOTS, "--search", "tree", "--movement", "euclidean")
@@ -172,7 +183,8 @@ def test_speed_makes_seconds_of_metres_and_a_deadline_forbids() -> None:
         (["--robot", "0,0"], "--robot [0, 0] is inside a wall"),
         (["--robot", "north"], "--robot: 'north' is no place"),
         (["--spacing", "1", "--placements", "cells"], "--spacing is of points"),
-        (["--spacing", "0.01"], "spacing"),
+        (["--spacing", "0.01"], "a spacing of 0.01 m makes about"),
+        (["--spacing", "0"], "--spacing 0.0 is out of range"),
         (["--weights", "combined"], "say --placements cells"),
         (["--placements", "cells", "--area-weight", "2"], "normalised weights have no coefficients"),
         (["--placements", "cells", "--robot-penalty", "many"], "give a number, 'pairwise' or 'fewest'"),
@@ -273,6 +285,18 @@ def test_the_present_tree_is_the_one_that_is_given() -> None:
     assumed, told = (sightline(*ROOM3, *ROBOTS, "--search", "one-edge", *links).stdout for links in ([], LINE))
     assert "base-1 1-2 2-3 3-4 4-agent, taken for the present tree; give --link for another" in assumed
     assert "base-1 1-2 2-3 3-4 4-agent\n" in told
+
+
+def test_more_nodes_than_are_searched_exactly_are_joined_all_the_same() -> None:
+    """15 terminals and 3 robots; the line of robots in their order cannot be placed at all."""
+    places = ((6, 32), (6, 48), (14, 32), (14, 48), (27, 32), (35, 32), (27, 48), (35, 48), (46, 32), (62, 32))
+    places += ((46, 48), (62, 48), (27, 3), (38, 20))
+    agents = [word for x, y in places for word in ("--agent", f"{x},{y}")]
+    starts = [word for place in ("60,35", "31,33", "42,45") for word in ("--robot", place)]
+    plan = answer("plan", "room3", "--base", "10,36", *agents, *starts)
+    check_tree(plan)
+    assert plan["present_tree"] is None
+    assert plan["lower_bound"] <= plan["cost"] + 1e-9
 
 
 def test_links_name_agents_by_number_and_leave_out_robots_that_may_idle() -> None:
