@@ -91,7 +91,7 @@ def plan(
         typer.Option(
             metavar="A-B",
             help="A link of the present tree, between base, agent (agent1, agent2 ...) and robots by number, such as "
-            "base-1; may be repeated. None: a line from the base by all robots in their order to the agent.",
+            "base-1; may be repeated. If not given, fixed and one-edge take a line by all robots in their order.",
             rich_help_panel=_MOVES,
         ),
     ] = None,
