@@ -114,6 +114,8 @@ def _place_points(
     t_host = ((ends - vertices[host]) * wall_direction[host]).sum(axis=1)
 
     touching = _find_incidences(vertices, origin, lines.direction, lines.reach, tolerance)
+    ended, side = np.nonzero(lines.end_vertex != NONE)
+    touching[ended, lines.end_vertex[ended, side]] = True  # a short wall's ray may miss it by more than the tolerance
     on_line, vertex = np.nonzero(touching)
     t_vertex = ((vertices[vertex] - origin[on_line]) * lines.direction[on_line]).sum(axis=1)
 

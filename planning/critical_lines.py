@@ -51,7 +51,13 @@ class CriticalLines:
 
 
 def find_critical_lines(
-    vertices: Floats, after: Ints, before: Ints, reflex: Ints, tolerance: float, longest_bitangent: float
+    vertices: Floats,
+    after: Ints,
+    before: Ints,
+    reflex: Ints,
+    tolerance: float,
+    longest_bitangent: float,
+    resolution: float,
 ) -> CriticalLines:
     """Inflection rays and bitangents of an environment.
 
@@ -63,10 +69,12 @@ def find_critical_lines(
         tolerance: length below which things touch.
         longest_bitangent: pairs farther apart have none: 0 for the inflection decomposition, infinity for the aspect
             decomposition, else the R of the R-aspect decomposition.
+        resolution: by how much coordinates may be rounded. Where that turns a short wall so far that its ray passes a
+            vertex in line with the wall by more than the tolerance, the ray still meets it.
 
     Complexity: O(r V) for the rays, O(r² V) at worst for the bitangents of r reflex vertices.
     """
-    rays = _find_rays(vertices, after, before, reflex, tolerance)
+    rays = _find_rays(vertices, after, before, reflex, tolerance, resolution)
     bitangents = _find_bitangents(vertices, after, before, reflex, longest_bitangent, tolerance)
     base, direction, reach, end_vertex, end_wall = (
         np.concatenate(columns) for columns in zip(rays, bitangents, strict=True)
@@ -87,9 +95,9 @@ def _distinct(end_vertex: Ints) -> Ints:
 
 @kernel
 def _shoot(
-    vertices: Floats, after: Ints, before: Ints, start: int, ux: float, uy: float, tolerance: float
+    vertices: Floats, after: Ints, before: Ints, start: int, ux: float, uy: float, tolerance: float, tilt: float
 ) -> tuple[float, int, int, bool]:
-    """Where the ray from vertex ``start`` along the unit vector u stops.
+    """Where the ray from vertex ``start`` along the unit vector u, known but for a ``tilt``, stops.
 
     Returns:
         Distance, vertex or `NONE`, wall or `NONE`, and whether a wall at that vertex lies along the ray. O(V).
@@ -102,31 +110,34 @@ def _shoot(
         bx, by = vertices[b, 0] - ox, vertices[b, 1] - oy
         side_a = ux * ay - uy * ax
         side_b = ux * by - uy * bx
-        if abs(side_a) <= tolerance:
-            t = ux * ax + uy * ay
+        t_a, t_b = ux * ax + uy * ay, ux * bx + uy * by
+        a_on, b_on = abs(side_a) <= max(tolerance, tilt * t_a), abs(side_b) <= max(tolerance, tilt * t_b)
+        if a_on:
+            t = t_a
             if t <= tolerance or t >= nearest:
                 continue
             c = before[a]
-            side_c = ux * (vertices[c, 1] - oy) - uy * (vertices[c, 0] - ox)
-            b_on, c_on = abs(side_b) <= tolerance, abs(side_c) <= tolerance
+            cx, cy = vertices[c, 0] - ox, vertices[c, 1] - oy
+            side_c = ux * cy - uy * cx
+            c_on = abs(side_c) <= max(tolerance, tilt * (ux * cx + uy * cy))
             if b_on or c_on or (side_b > 0.0) != (side_c > 0.0):
                 nearest, vertex, wall, along_wall = t, a, NONE, b_on or c_on
-        elif abs(side_b) > tolerance and (side_a > 0.0) != (side_b > 0.0):
-            t_a = ux * ax + uy * ay
-            t = t_a + (ux * bx + uy * by - t_a) * side_a / (side_a - side_b)
+        elif not b_on and (side_a > 0.0) != (side_b > 0.0):
+            t = t_a + (t_b - t_a) * side_a / (side_a - side_b)
             if tolerance < t < nearest:
                 nearest, vertex, wall, along_wall = t, NONE, a, False
     return nearest, vertex, wall, along_wall
 
 
-def _find_rays(vertices: Floats, after: Ints, before: Ints, reflex: Ints, tolerance: float) -> Lines:
+def _find_rays(vertices: Floats, after: Ints, before: Ints, reflex: Ints, tolerance: float, resolution: float) -> Lines:
     """Both inflection rays of every reflex vertex, outward along its walls; coincident ones once. O(r V)."""
     base = np.repeat(reflex, 2)
     span = vertices[base] - vertices[np.stack([before[reflex], after[reflex]], axis=1).ravel()]
-    direction = span / np.hypot(span[:, 0], span[:, 1])[:, None]
+    length = np.hypot(span[:, 0], span[:, 1])
+    direction = span / length[:, None]
     reach = np.zeros((len(base), 2))
     end_vertex, end_wall = np.stack([base, base], axis=1), np.full((len(base), 2), NONE)
-    _shoot_rays(vertices, after, before, base, direction, tolerance, reach, end_vertex, end_wall)
+    _shoot_rays(vertices, after, before, base, direction, tolerance, resolution / length, reach, end_vertex, end_wall)
     rows = _distinct(end_vertex)
     return base[rows], direction[rows], reach[rows], end_vertex[rows], end_wall[rows]
 
@@ -139,6 +150,7 @@ def _shoot_rays(
     base: Ints,
     direction: Floats,
     tolerance: float,
+    tilt: Floats,
     reach: Floats,
     end_vertex: Ints,
     end_wall: Ints,
@@ -146,7 +158,7 @@ def _shoot_rays(
     """Write the far end of each ray into the second columns of ``reach``, ``end_vertex`` and ``end_wall``."""
     for k in range(len(base)):
         reach[k, 1], end_vertex[k, 1], end_wall[k, 1], _ = _shoot(
-            vertices, after, before, base[k], direction[k, 0], direction[k, 1], tolerance
+            vertices, after, before, base[k], direction[k, 0], direction[k, 1], tolerance, tilt[k]
         )
 
 
@@ -238,8 +250,8 @@ def _draw_bitangents(
                 last = a if blocked else last
             if blocked:
                 continue
-            back, back_vertex, back_wall, back_along = _shoot(vertices, after, before, v, -ux, -uy, tolerance)
-            ahead, ahead_vertex, ahead_wall, ahead_along = _shoot(vertices, after, before, w, ux, uy, tolerance)
+            back, back_vertex, back_wall, back_along = _shoot(vertices, after, before, v, -ux, -uy, tolerance, 0.0)
+            ahead, ahead_vertex, ahead_wall, ahead_along = _shoot(vertices, after, before, w, ux, uy, tolerance, 0.0)
             if back_along or ahead_along:
                 continue
             if count < len(pairs):

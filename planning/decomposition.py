@@ -90,11 +90,13 @@ class Frame:
         origin: (2,) float, metres, map frame: the middle of the map's bounding box.
         size_m: the longer side of that box.
         tolerance: the environment's tolerance in units of ``size_m``.
+        resolution: how far apart coordinates of the map frame are that can be told apart, in the same unit.
     """
 
     origin: Floats
     size_m: float
     tolerance: float
+    resolution: float
 
     @classmethod
     def of(cls, environment: Environment) -> Frame:
@@ -102,7 +104,8 @@ class Frame:
         x_min, y_min, x_max, y_max = environment.bounds
         size = max(x_max - x_min, y_max - y_min)
         origin = np.array([x_min + 0.5 * (x_max - x_min), y_min + 0.5 * (y_max - y_min)])
-        return cls(origin, size, environment.tolerance_m / size)
+        resolution = float(np.spacing(np.abs(environment.bounds).max()))
+        return cls(origin, size, environment.tolerance_m / size, resolution / size)
 
     def enter(self, points: Floats) -> Floats:
         """Points (n, 2) of the map frame, metres, in this frame."""
@@ -145,7 +148,7 @@ def decompose(environment: Environment, kind: Kind = "inflection", max_bitangent
     reflex = np.flatnonzero(environment.is_reflex)
     longest = 0.0 if kind == "inflection" else math.inf if max_bitangent_m is None else max_bitangent_m / frame.size_m
 
-    lines = find_critical_lines(vertices, after, before, reflex, frame.tolerance, longest)
+    lines = find_critical_lines(vertices, after, before, reflex, frame.tolerance, longest, frame.resolution)
     arrangement = arrange(vertices, after, lines, frame.tolerance)
     unit_corners = arrangement.points[arrangement.corners]
     areas, centroids = measure_cells(unit_corners, arrangement.starts)

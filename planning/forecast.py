@@ -71,14 +71,14 @@ def forecast_cells(environment: Environment, kind: Kind, max_bitangent_m: float 
     after = np.arange(1, len(vertices) + 1)
     after[environment.ring_starts[1:] - 1] = environment.ring_starts[:-1]
     longest = 0.0 if kind == "inflection" else math.inf if max_bitangent_m is None else max_bitangent_m / frame.size_m
-    lines = find_critical_lines(
-        vertices, after, np.argsort(after), np.flatnonzero(environment.is_reflex), frame.tolerance, longest
-    )
+    reflex = np.flatnonzero(environment.is_reflex)
+    lines = find_critical_lines(vertices, after, np.argsort(after), reflex, frame.tolerance, longest, frame.resolution)
     number = len(lines.base)
     crossings = _estimate_crossings(lines, vertices, frame.tolerance)
-    reflex = int(environment.is_reflex.sum())
     ends = int(np.count_nonzero(lines.end_wall != NONE))
-    cells = round(1 + ends + crossings - len(environment.holes) - lines.ray_count + 2 * reflex + lines.bitangent_count)
+    cells = round(
+        1 + ends + crossings - len(environment.holes) - lines.ray_count + 2 * len(reflex) + lines.bitangent_count
+    )
     return Forecast(
         number,
         max(cells, 1),

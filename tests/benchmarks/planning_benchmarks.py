@@ -109,7 +109,7 @@ def _critical_segments(environment: Environment) -> shapely.MultiLineString:
     after = environment.successors
     vertices = frame.enter(environment.vertices)
     reflex = np.flatnonzero(environment.is_reflex)
-    lines = find_critical_lines(vertices, after, np.argsort(after), reflex, frame.tolerance, np.inf)
+    lines = find_critical_lines(vertices, after, np.argsort(after), reflex, frame.tolerance, np.inf, frame.resolution)
     ends = vertices[lines.base, None] + lines.reach[:, :, None] * lines.direction[:, None]
     return shapely.multilinestrings(np.concatenate([environment.walls, frame.leave(ends)]))
 

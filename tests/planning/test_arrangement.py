@@ -26,7 +26,7 @@ def ring_neighbours(environment: Environment) -> tuple[Ints, Ints]:
 def find_lines(environment: Environment, longest: float) -> CriticalLines:
     after, before = ring_neighbours(environment)
     reflex = np.flatnonzero(environment.is_reflex)
-    return find_critical_lines(environment.vertices, after, before, reflex, environment.tolerance_m, longest)
+    return find_critical_lines(environment.vertices, after, before, reflex, environment.tolerance_m, longest, 0.0)
 
 
 @pytest.mark.parametrize("seed", range(8))
