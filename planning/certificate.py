@@ -11,7 +11,8 @@ What a valid certificate says, of all times from the schedule's start to its end
 Sight is closed: a line that grazes a wall holds. Everything is judged in free space that reaches into the walls by
 `depth_m`, twice the map's tolerance (some 10⁻⁷ m on a map of 100 m), which is as deep as the planners' sight lines may
 dip, and discs may overlap by as much: so no rounding of theirs makes a refusal. What is nearer to the limit than an
-eighth of that depth is refused. Speeds may be too high by 10⁻⁹ of them.
+eighth of that depth is refused. A piece of path may be longer than its member's speed allows by 10⁻⁹ of itself and
+that depth.
 
 Where a member goes into a wall nothing is said of what it sees there. Nothing is said either of members whose future is
 not planned: leave an independent agent out, and certify the chain to its last relay. Members advance by this one clock;
