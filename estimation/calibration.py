@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -90,7 +90,7 @@ def calibrate(
 
     Raises:
         NotCalibrated: fewer than 3 ranges, different numbers of them, a number that is not finite, a coverage that is
-            no such share, or a scale asked of ranges that are all alike.
+            no such share, a line of another name, or a scale asked of ranges that are all alike.
 
     Complexity: O(n) per step; the narrowest line O(n log n) or so (HiGHS).
     """
@@ -101,6 +101,8 @@ def calibrate(
         )
     if not (np.isfinite(d).all() and np.isfinite(z).all()):
         raise NotCalibrated("a distance or range is not a finite number: leave that measurement out")
+    if line not in get_args(Line):
+        raise NotCalibrated(f"the line is one of {', '.join(get_args(Line))}, not {line!r}")
     if not 0.5 < coverage <= 1:
         raise NotCalibrated(f"the coverage must be above 0.5 and at most 1, not {coverage}: most data must be right")
     if scale is None and np.ptp(z) < 1e-6 * (1 + np.abs(z).max()):

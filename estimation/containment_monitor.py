@@ -74,7 +74,15 @@ class ContainmentMonitor:
 
         Returns:
             The verdict over the window, this range included.
+
+        Raises:
+            NotMonitored: a number is not finite. It would count as agreement; the window is as it was.
         """
+        if not all(map(math.isfinite, (range_m, bound_m, nearest_m, farthest_m))):
+            raise NotMonitored(
+                f"a range of {range_m} m ± {bound_m} m and a set {nearest_m} to {farthest_m} m away tell nothing: "
+                "numbers must be finite, and the set have begun"
+            )
         self._needed.append(max(nearest_m - range_m, range_m - farthest_m, 0.0))
         self._bounds.append(bound_m)
         return self.verdict()

@@ -181,10 +181,11 @@ class FeasibleSet:
         return Ellipsoid.from_factor(self._origin + self._center[:2], self._factor[:2])
 
     def tangent_slice(self) -> Ellipsoid | EmptyIntersection:
-        """The ellipsoid's slice by the plane that touches the paraboloid next to its centre (Thesis §2.2.3, fig. 9).
+        """The slice by the plane that touches the paraboloid above or below the centre (Thesis §2.2.3, fig. 9).
 
-        In (x, y), metres, map frame. It is no bound. Empty where that plane misses the ellipsoid. The point is the one
-        below or above the centre, which the frame's origin near the set makes the nearest in all but name.
+        In (x, y), metres, map frame. It is no bound. Empty where that plane misses the ellipsoid. The thesis takes the
+        point of the paraboloid that is closest to the centre (corrected): which one that is depends on the unit and the
+        frame, as x and y are metres and s is square metres. The one above or below depends on neither.
         """
         x, y = self._center[:2]
         raised = np.array([[1.0, 0.0], [0.0, 1.0], [2.0 * x, 2.0 * y]])

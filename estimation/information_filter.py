@@ -47,9 +47,9 @@ class InformationFilter:
     def from_guess(cls, mean: ArrayLike, covariance: ArrayLike) -> InformationFilter:
         """Start at a guess: mean (2,) float, metres, and covariance (2, 2) float, m², positive definite."""
         x, P = np.asarray(mean, dtype=np.float64), np.asarray(covariance, dtype=np.float64)
-        if x.shape != (2,) or P.shape != (2, 2) or np.linalg.eigvalsh(P).min() <= 0:
+        if x.shape != (2,) or not np.isfinite(x).all() or not _is_covariance(P) or np.linalg.eigvalsh(P)[0] <= 0:
             raise NotInformative(
-                f"a guess is a position (2,) and a positive definite covariance (2, 2), not {x} and {P}"
+                f"a guess is a finite position (2,) and a positive definite covariance (2, 2), not {x} and {P}"
             )
         Y = np.asarray(np.linalg.inv(P), dtype=np.float64)
         return cls(Y @ x, Y)
@@ -77,12 +77,20 @@ class InformationFilter:
         Args:
             process_covariance: (2, 2) float, m²: Q.
             transition: (2, 2) float: F; the target stands if not given.
+
+        Raises:
+            NotInformative: Q is no covariance, or F is not (2, 2) and finite.
         """
         F = np.eye(2) if transition is None else np.asarray(transition, dtype=np.float64)
+        Q = np.asarray(process_covariance, dtype=np.float64)
+        if F.shape != (2, 2) or not np.isfinite(F).all() or not _is_covariance(Q) or np.linalg.eigvalsh(Q)[0] < 0:
+            raise NotInformative(
+                f"a prediction takes a covariance and a finite transition, both (2, 2), not {Q} and {F}"
+            )
         if not self.known:
             return self
         mean = F @ self.mean
-        P = F @ self.covariance @ F.T + np.asarray(process_covariance, dtype=np.float64)
+        P = F @ self.covariance @ F.T + Q
         Y = np.asarray(np.linalg.inv(P), dtype=np.float64)
         return InformationFilter(Y @ mean, Y)
 
@@ -95,13 +103,17 @@ class InformationFilter:
             deviation_m: standard deviation of a range; R = deviation². For errors even in ±ε it is ε / √3.
 
         Raises:
-            NotInformative: nothing is known yet, or the deviation is not positive.
+            NotInformative: nothing is known yet, the deviation is not positive, or a number is not finite.
         """
-        if not deviation_m > 0:
-            raise NotInformative(f"the deviation of a range must be positive, not {deviation_m}")
+        if not 0 < deviation_m < math.inf:
+            raise NotInformative(f"the deviation of a range must be positive and finite, not {deviation_m}")
+        places = np.atleast_2d(np.asarray(anchors, dtype=np.float64))
+        measured = np.atleast_1d(np.asarray(ranges, dtype=np.float64))
+        if places.shape != (len(measured), 2) or not (np.isfinite(places).all() and np.isfinite(measured).all()):
+            raise NotInformative(f"ranges (n,) come from places (n, 2), all finite, not {measured} from {places}")
         x = self.mean
         y, Y = self.vector, self.matrix
-        for a, z in zip(np.atleast_2d(anchors), np.atleast_1d(ranges), strict=True):
+        for a, z in zip(places, measured, strict=True):
             H, r = _sight(x, a)
             i = H / deviation_m**2 * ((z - r) + H @ x)
             y, Y = y + i, Y + np.outer(H, H) / deviation_m**2
@@ -127,6 +139,11 @@ class InformationFilter:
         if not self.known or limits.step_m == 0:
             return np.zeros(2)
         return turn_about(self.mean, self.covariance, a)
+
+
+def _is_covariance(P: Floats) -> bool:
+    """Whether it can be one: (2, 2), finite, symmetric but for rounding."""
+    return P.shape == (2, 2) and bool(np.isfinite(P).all()) and bool(np.abs(P - P.T).max() <= 1e-9 * np.abs(P).max())
 
 
 def _sight(x: Floats, a: Floats) -> tuple[Floats, float]:

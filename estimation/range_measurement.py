@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, SupportsFloat
 
 from numpy.typing import ArrayLike
 
@@ -65,10 +65,13 @@ def annulus(anchor_xy: ArrayLike, range_m: float, bound_m: Bound) -> Annulus:
         bound_m: ε, or (below, above), metres.
 
     Raises:
-        BadRange: a number is not finite, or a bound is negative.
+        BadRange: a number is none or not finite, or a bound is negative.
     """
-    below, above = bound_m if isinstance(bound_m, tuple) else (bound_m, bound_m)
-    if not math.isfinite(range_m):
+    try:
+        below, above = map(float, bound_m if isinstance(bound_m, tuple) else (bound_m, bound_m))
+    except (TypeError, ValueError):
+        raise BadRange(f"a bound is a number or a pair (below, above) in metres, not {bound_m!r}") from None
+    if not (isinstance(range_m, SupportsFloat) and math.isfinite(range_m)):
         raise BadRange(f"a range of {range_m} m says nothing: leave the measurement out")
     if not (0.0 <= below < math.inf and 0.0 <= above < math.inf):
         raise BadRange(f"the bound of a range must be finite and at least 0 m on either side, not {bound_m}")

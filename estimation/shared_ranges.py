@@ -12,13 +12,15 @@ peer's clock*. Growing each prediction by v (Δt + clock_bound) instead is right
 
 *Memory.* A range is folded into the base, the set in front of the log, once nothing can come before it and every
 roster member has it, or a stated horizon has passed. A range that comes after its place was folded is dropped and
-counted; that costs area, never containment, and the peers may then differ.
+counted; that costs area, never containment, and the peers may then differ. Of every name that ever measured a count
+stays for ever, some dozen bytes for each start of a peer.
 
 All of it is state: no clock, no messages. ``digest`` and ``delta`` are what the team protocol is to carry.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from copy import deepcopy
 from dataclasses import dataclass
@@ -102,7 +104,7 @@ class SharedRanges(Generic[StateT]):
     ) -> None:
         self._peer, self._roster, self._begin = peer, tuple(roster), begin
         self._speed, self._horizon = speed_m_s, horizon_s
-        self._widening = speed_m_s * clock_bound_s
+        self._clock_bound, self._widening = clock_bound_s, speed_m_s * clock_bound_s
         if peer not in self._roster or min(speed_m_s, clock_bound_s, horizon_s) < 0:
             raise BadRecord(
                 f"'{peer}' must be in the roster {self._roster}, and speed, clock bound and horizon at least 0"
@@ -149,11 +151,17 @@ class SharedRanges(Generic[StateT]):
         self.receive([record])
         return record
 
-    def receive(self, records: Iterable[TimedRange]) -> int:
-        """Take in ranges from anywhere, in any order, as often as they come; how many were new and in time."""
+    def receive(self, records: Iterable[TimedRange], now_s: float = math.inf) -> int:
+        """Take in ranges from anywhere, in any order, as often as they come; how many were new and in time.
+
+        Args:
+            records: the ranges.
+            now_s: this peer's time, seconds. What is stamped later than any clock can show by now is left out, unheard:
+                one such range, once folded, would make all that come after it late.
+        """
         new = 0
         for record in records:
-            if self._log.has(record):
+            if self._log.has(record) or record.time_s > now_s + self._clock_bound:
                 continue
             folded_through, _ = self._base
             if folded_through is not None and record.key <= folded_through:
@@ -174,7 +182,9 @@ class SharedRanges(Generic[StateT]):
         return self._log.missing_in(digest.heard)
 
     def note(self, digest: Digest) -> None:
-        """Remember what another peer has; older digests than the last one change nothing."""
+        """Remember what another peer has; older digests than the last one change nothing, nor do those of strangers."""
+        if digest.peer not in self._roster:
+            return
         known = self._digests.get(digest.peer)
         if known is None or digest.clock_s >= known.clock_s:
             self._digests[digest.peer] = digest

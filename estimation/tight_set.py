@@ -13,7 +13,7 @@ remembered with wider bounds.
 *How tight.* A target that stands: at most 1.1 times the true area after 5 to 40 ranges, 1.01 in the median, mirror
 images, slivers and far anchors included (tests). Beyond that are rings more than some 5000 times wider than thick,
 which the bounded number of pieces cannot follow round, and sets no wider than some micrometres, where the padding of
-the ranges decides. A target that moves: 1.02 times what exact growing and cutting would leave in the median, since every
+the ranges decides. A target that moves: 1.02 times what exact growing and cutting would leave in the median, as every
 step bounds the disc of the move by a polygon and may fuse neighbours; 1.08 in 99 of 100 sets, and 1.26 in the worst of
 4800 (160 runs). Most of that worst is pieces that overlap where no line parts them: their area counts twice.
 """

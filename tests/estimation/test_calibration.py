@@ -87,3 +87,5 @@ def test_data_that_say_nothing_are_refused():
         calibrate([1, 2, 3], [5, np.nan, 5])
     with pytest.raises(NotCalibrated, match="coverage"):
         calibrate([1, 2, 3], [1, 2, 3], coverage=0.4)
+    with pytest.raises(NotCalibrated, match="unbiased, narrowest, not 'straight'"):
+        calibrate([1, 2, 3], [1, 2, 3], line="straight")

@@ -71,3 +71,12 @@ def test_a_monitor_that_cannot_be():
         ContainmentMonitor(corrupt_share=0.5)
     with pytest.raises(NotMonitored, match="window"):
         ContainmentMonitor(window=3)
+
+
+@pytest.mark.parametrize("place", range(4))
+def test_what_is_not_finite_is_no_agreement(place):
+    monitor, told = ContainmentMonitor(), [5.0, 0.1, 4.8, 5.2]
+    told[place] = float("nan")
+    with pytest.raises(NotMonitored, match="finite"):
+        monitor.observe(*told)
+    assert monitor.verdict().ranges == 0

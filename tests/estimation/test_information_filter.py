@@ -85,3 +85,22 @@ def test_nothing_known():
 def test_a_range_from_the_estimate_tells_no_direction():
     filter_ = InformationFilter.from_guess((2, 2), np.eye(2))
     np.testing.assert_allclose(filter_.measure([(2, 2)], [0.3], 0.5).matrix, filter_.matrix)
+
+
+@pytest.mark.parametrize(
+    "work",
+    [
+        lambda held: held.from_guess((float("nan"), 0), np.eye(2)),
+        lambda held: held.from_guess((0, 0), [[1, 0.5], [0, 1]]),
+        lambda held: held.from_guess((0, 0), np.full((2, 2), np.inf)),
+        lambda held: held.measure([(0, 0)], [float("nan")], 0.5),
+        lambda held: held.measure([(0, float("inf"))], [5], 0.5),
+        lambda held: held.measure([(0, 0), (1, 0)], [5], 0.5),
+        lambda held: held.measure([(0, 0)], [5], float("inf")),
+        lambda held: held.predict(np.diag([-1.0, 1])),
+        lambda held: held.predict(np.eye(2), np.full((2, 2), np.nan)),
+    ],
+)
+def test_numbers_that_would_leave_no_gaussian_are_refused(work):
+    with pytest.raises(NotInformative, match="not"):
+        work(InformationFilter.from_guess((1, 2), np.eye(2)))

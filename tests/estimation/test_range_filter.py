@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -185,9 +186,13 @@ def test_asymmetric_bounds() -> None:
         ((0.0, 0.0), 1.0, (0.1, math.inf), "bound"),
         ((0.0, math.nan), 1.0, 0.5, "anchor"),
         ((0.0, 0.0, 0.0), 1.0, 0.5, "anchor"),
+        ((0.0, 0.0), "far", 0.5, "range of far"),
+        ((0.0, 0.0), 1.0, [0.1, 0.2], "pair"),
+        ((0.0, 0.0), 1.0, np.array([0.1, 0.2]), "pair"),
+        ((0.0, 0.0), 1.0, (0.1, 0.2, 0.3), "pair"),
     ],
 )
-def test_bad_measurements_are_refused(anchor: tuple[float, ...], range_m: float, bound_m: float, text: str) -> None:
+def test_bad_measurements_are_refused(anchor: tuple[float, ...], range_m: float, bound_m: Any, text: str) -> None:
     f = RangeFilter()
     f.measure((0.0, 0.0), 5.0, 0.5)
     before = f.snapshot()

@@ -78,9 +78,9 @@ class Trolley:
     def errors(self) -> Floats:
         return self.ranges - np.hypot(*(self.truth - self.anchors).T)
 
-    def follow(self, held: RangeFilter | TightSet) -> tuple[list[int], float]:
-        """Ranges after which the trolley is outside, and the RMSE of the estimate after the first fifth."""
-        lost, errors, before = [], [], self.times[0]
+    def follow(self, held: RangeFilter | TightSet) -> tuple[list[int], float, float]:
+        """Ranges after which the trolley is outside; RMSE of the estimate, and median area, after the first fifth."""
+        lost, errors, areas, before = [], [], [], self.times[0]
         for i, (t, anchor, z) in enumerate(zip(self.times, self.anchors, self.ranges, strict=True)):
             held.predict(TROLLEY_SPEED_M_S * (t - before))
             held.measure(anchor, z, TROLLEY_BOUND_M)
@@ -91,7 +91,9 @@ class Trolley:
                 if not inside.contains(self.truth[i]):
                     lost.append(i)
                 errors.append(np.hypot(*(estimate - self.truth[i])))
-        return lost, float(np.sqrt(np.mean(np.square(errors[len(errors) // 5 :]))))
+                areas.append(inside.area_m2)
+        late = slice(len(errors) // 5, None)
+        return lost, float(np.sqrt(np.mean(np.square(errors[late])))), float(np.median(areas[late]))
 
 
 TROLLEY_BOUND_M = 0.39
@@ -116,8 +118,8 @@ def trolley() -> Trolley:
 
 
 def test_the_trolley_is_never_outside_the_ellipsoid(trolley: Trolley) -> None:
-    lost, rmse = trolley.follow(RangeFilter())
-    print(f"lias_fast, ellipsoid: RMSE {rmse:.3f} m")
+    lost, rmse, area = trolley.follow(RangeFilter())
+    print(f"lias_fast, ellipsoid: RMSE {rmse:.3f} m, median area {area:.2f} m²")
     assert not lost
     assert rmse <= 0.18
 
@@ -126,9 +128,10 @@ def test_the_tight_set_loses_the_trolley_only_to_ranges_that_break_their_bound(t
     """The ellipsoid's slack hides them; a tight set has none. Every loss begins at a false range."""
     false = np.flatnonzero(np.abs(trolley.errors) > TROLLEY_BOUND_M)
     assert len(false) == 8
-    lost, rmse = trolley.follow(TightSet())
+    lost, rmse, area = trolley.follow(TightSet())
     begins = [i for i in lost if i - 1 not in lost]
-    print(f"lias_fast, tight set: outside {len(lost)} times, RMSE {rmse:.3f} m; false ranges {false}, losses {begins}")
+    print(f"lias_fast, tight set: outside {len(lost)} times, RMSE {rmse:.3f} m, median area {area:.2f} m²")
+    print(f"false ranges {false}, losses begin at {begins}")
     assert set(begins) <= set(false.tolist())
     assert len(lost) <= 0.01 * len(trolley.times)
     assert rmse <= 0.18
@@ -136,7 +139,7 @@ def test_the_tight_set_loses_the_trolley_only_to_ranges_that_break_their_bound(t
 
 def test_a_relaxed_tight_set_never_loses_the_trolley(trolley: Trolley) -> None:
     """Eight anchors take turns; one of them may be wrong each time round."""
-    lost, rmse = trolley.follow(TightSet(Relaxation(tolerated=1, block=8)))
-    print(f"lias_fast, relaxed: RMSE {rmse:.3f} m")
+    lost, rmse, area = trolley.follow(TightSet(Relaxation(tolerated=1, block=8)))
+    print(f"lias_fast, relaxed: RMSE {rmse:.3f} m, median area {area:.2f} m²")
     assert not lost
     assert rmse <= 0.18

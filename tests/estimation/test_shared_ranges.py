@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from estimation.ellipsoid import EmptyIntersection
 from estimation.range_filter import RangeFilter
 from estimation.range_log import BadRecord, Heard, RangeLog, TimedRange
-from estimation.shared_ranges import SharedRanges
+from estimation.shared_ranges import Digest, SharedRanges
 from estimation.shared_snapshot import NotASnapshot, TimedSnapshot, fuse_snapshots, predict_snapshot
 from estimation.tight_set import TightSet
 
@@ -184,15 +184,24 @@ def test_every_peer_contains_the_target_whatever_the_network_does(begin, speed, 
         assert len({numbers_of(state) for state in states}) == 1, f"seed {seed}"
 
 
-def test_after_quiet_peers_agree_and_are_as_tight_as_one_that_hears_all():
-    for seed in range(4):
-        world, peers = after(gossip(seed, TightSet, seconds=8, quiet=4, fold=False))
-        together = {record.key: record for peer in peers.values() for record in peer.log}
-        central = TightSet()
-        for _, record in sorted(together.items()):
-            central.measure(record.anchor, record.range_m, record.bound_m)
-        areas = [peer.state_at(99.0).area_m2 for peer in peers.values()]
-        assert max(areas) <= 1.2 * central.area_m2, f"seed {seed}"
+@pytest.mark.parametrize("speed, clock_bound, fold", [(0.0, 0.0, False), (0.5, 0.0, True), (0.5, 0.1, True)])
+def test_after_quiet_peers_agree_and_are_as_tight_as_one_that_hears_all(speed, clock_bound, fold):
+    """Also folded: with the area of a central set that hears all at once, and stands by the same clock bound."""
+    for seed in range(3):
+        together = {}
+        gossiping = gossip(seed, TightSet, speed=speed, clock_bound=clock_bound, seconds=8, quiet=4, fold=fold)
+        for now, world, peers in gossiping:  # noqa: B007
+            together |= {record.key: record for peer in peers.values() for record in peer.log}
+        assert len(together) == 4 * 16
+        central, before, widening = TightSet(), None, speed * clock_bound
+        for (time, *_), record in sorted(together.items()):
+            central.predict(0.0 if before is None else speed * (time - before))
+            central.measure(record.anchor, record.range_m, record.bound_m + widening)
+            before = time
+        central.predict(speed * (now - before))
+        for peer in peers.values():
+            assert (peer.folded > 40) == fold and peer.late == 0, f"seed {seed}"
+            assert peer.state_at(now).area_m2 <= 1.2 * central.area_m2, f"seed {seed}"
         assert len({peer.log.heard["ann"] for peer in peers.values()}) == 1
         assert central.contains(world.target)
 
@@ -250,6 +259,24 @@ def test_a_dead_peer_does_not_fill_the_memory_and_late_ranges_are_dropped_and_co
     assert shared.receive([next_one]) == 1
     # What came too late is not asked for again.
     assert shared.digest(30).heard["bob"] == Heard(2)
+
+
+def test_a_clock_that_is_years_ahead_does_not_silence_the_others():
+    shared = SharedRanges("ann", PEERS, RangeFilter, speed_m_s=1.0, clock_bound_s=0.2, horizon_s=5)
+    ahead = TimedRange("bob", 0, 1e8, (9.0, 0.0), 9.0, 0.5)
+    right = TimedRange("cid", 0, 10.15, (9.0, 0.0), 9.0, 0.5)
+    assert shared.receive([ahead, right], now_s=10.0) == 1
+    assert shared.fold(20.0) == 1
+    shared.record(20.0, (0.0, 3.0), 4.0, 0.5)
+    assert shared.late == 0 and shared.log.heard["ann"] == Heard(1)
+    assert "bob" not in shared.log.heard
+
+
+def test_strangers_leave_nothing_behind():
+    shared = SharedRanges("ann", PEERS, RangeFilter)
+    for start in range(50):
+        shared.note(Digest(f"eve-{start}", 1.0, {"eve": Heard(3)}))
+    assert not shared._digests
 
 
 def test_gaps_are_given_up_with_the_horizon():
