@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
 from launcher.cli import app
-from launcher.studies import drawing, localization, ranges
+from launcher.studies import drawing, localization, ranges, ranging_run
 from launcher.studies.localization import BadStudy, study_localization
 from launcher.studies.localization_figures import snapshot_steps, split_steps
 from launcher.studies.range_data import BadData, read_range_data
@@ -217,6 +217,8 @@ def test_the_study_in_short(tmp_path, monkeypatch):
     some = {law: LAWS[law] for law in ("thesis' gradient", "covariance")} | {"5 steps ahead": LAWS["covariance"]}
     monkeypatch.setattr(localization, "LAWS", some)
     monkeypatch.setattr(localization, "run_experiment", partial(run_experiment, steps=CORRUPT_STEP + 6))
+    # Three sets in one: other tests follow it, and most of a run's time is its.
+    monkeypatch.setattr(ranging_run, "Relaxation", lambda: "reject")
     monkeypatch.setattr(drawing, "DOTS_PER_IN", 40)
     monkeypatch.setattr(drawing, "new_figure", lambda *size_in: Figure(size_in, dpi=40))
     told = []
