@@ -79,7 +79,7 @@ class Trolley:
         return self.ranges - np.hypot(*(self.truth - self.anchors).T)
 
     def follow(self, held: RangeFilter | TightSet) -> tuple[list[int], float, float]:
-        """Ranges after which the trolley is outside; RMSE of the estimate, and median area of every tenth, after the first fifth."""
+        """Ranges after which it is outside; RMSE and median area (of every ninth: all anchors) after the first fifth."""
         lost, errors, areas, before = [], [], [], self.times[0]
         for i, (t, anchor, z) in enumerate(zip(self.times, self.anchors, self.ranges, strict=True)):
             held.predict(TROLLEY_SPEED_M_S * (t - before))
@@ -91,7 +91,7 @@ class Trolley:
                 if not inside.contains(self.truth[i]):
                     lost.append(i)
                 errors.append(np.hypot(*(estimate - self.truth[i])))
-                if i % 10 == 0:
+                if i % 9 == 0:
                     areas.append(inside.area_m2)
         late = np.square(errors[len(errors) // 5 :])
         return lost, float(np.sqrt(np.mean(late))), float(np.median(areas[len(areas) // 5 :]))
