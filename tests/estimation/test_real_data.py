@@ -79,7 +79,7 @@ class Trolley:
         return self.ranges - np.hypot(*(self.truth - self.anchors).T)
 
     def follow(self, held: RangeFilter | TightSet) -> tuple[list[int], float, float]:
-        """Ranges after which it is outside; RMSE and median area (of every ninth: all anchors) after the first fifth."""
+        """Ranges after which it is outside; RMSE and median area (every ninth: all anchors) after the first fifth."""
         lost, errors, areas, before = [], [], [], self.times[0]
         for i, (t, anchor, z) in enumerate(zip(self.times, self.anchors, self.ranges, strict=True)):
             held.predict(TROLLEY_SPEED_M_S * (t - before))
