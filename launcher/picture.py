@@ -109,7 +109,7 @@ def draw_plan(
         ("s", _BASE, "base", [base], ["B"]),
         ("o", _RELAY, "relay", relays, names),
         ("o", _IDLE, "idle", [*idle.values()], [*idle]),
-        ("D", _AGENT, "agent", agents, ["A"] * len(agents)),
+        ("D", _AGENT, "agent", agents, ["A"] if len(agents) == 1 else [f"A{i}" for i in range(1, len(agents) + 1)]),
     ]
     places = np.array([place for *_, these, _ in kinds for place in these], dtype=float)
     shown = _spread(axes, places)

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -61,6 +61,16 @@ class CompiledMap:
     """Robots are in the part of the free space at this point, metres, as in `Environment.inflated`."""
     announce: Callable[[str], None] = _say_nothing
     """Is told of files that are damaged or cannot be written, which is no error."""
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.environment, Environment):
+            raise TypeError(
+                f"a compiled map is made of an Environment, not of {self.environment!r}: Environment.load it"
+            )
+        if self.kind not in get_args(Kind):
+            raise ValueError(f"there are no {self.kind!r} cells: use one of {', '.join(get_args(Kind))}")
+        if not 0.0 <= self.radius_m < np.inf:
+            raise ValueError(f"a robot's radius is a finite number of metres, at least 0, not {self.radius_m!r}")
 
     @cached_property
     def cells(self) -> Cells:

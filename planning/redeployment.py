@@ -57,6 +57,10 @@ MOST_JOINED: Final = 1000
 """Placements up to which that bound, O(N³), takes no longer than the search."""
 
 
+FIRST_TWO: Final = (0, 1)
+"""Base and agent, where nobody says otherwise."""
+
+
 class InvalidRedeployment(ValueError):
     """What is asked makes no sense; the text says which argument, where in it, and what to do."""
 
@@ -82,7 +86,7 @@ def redeploy(
     mu: float = 1.0,
     search: Search = "exact",
     tree: ArrayLike | None = None,
-    ends: ArrayLike = (0, 1),
+    ends: ArrayLike = FIRST_TWO,
     idle: bool = False,
 ) -> Redeployment:
     """The cheapest redeployment: thesis §3.5.1 and §3.6, and beyond them.
@@ -213,6 +217,10 @@ def _checked_costs(move: ArrayLike) -> Floats:
 
 
 def _checked_ends(ends: ArrayLike, number: int, search: Search) -> list[int]:
+    if search == "chain" and number < 2:
+        raise InvalidRedeployment(f"a chain joins two nodes, and move has {number}: give a row for each end")
+    if ends is FIRST_TWO and number == 1:
+        return [0]
     given = _whole_numbers(ends)
     if given is None or given.ndim != 1 or len(given) == 0:
         raise InvalidRedeployment(f"ends are the nodes that stay, at least one; they are {ends!r}")

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.steiner import steiner_tree
+from planning.tree import InvalidRequest
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -63,8 +64,13 @@ def most_relays(visible: Bools) -> MostRelays:
     Args:
         visible: (N, N) bool, symmetric, True on the diagonal, N ≥ 1.
 
+    Raises:
+        InvalidRequest: it is no such matrix.
+
     Complexity: O(N² / 64) words for each search; N searches at worst, a few dozen on floor plans.
     """
+    if not (isinstance(visible, np.ndarray) and visible.dtype == np.bool_ and visible.ndim == 2 and len(visible) > 0):
+        raise InvalidRequest("who sees whom is an (N, N) array of bool: of edge weights W give numpy.isfinite(W)")
     n = len(visible)
     rows = _pack(visible)
     lower, upper = np.zeros(n, np.int64), np.full(n, n)

@@ -183,3 +183,16 @@ def test_small_cells_are_no_placements_but_an_agent_can_be_in_them() -> None:
     assert all(large.sees(cells.centroids[cell]).any() for cell in small)
     with pytest.raises(NoPlacement, match="no cell of 1e\\+06 m²"):
         _ = CompiledMap(environment, "aspect", 0.2, least_area_m2=1e6).cell_placements
+
+
+@pytest.mark.parametrize(
+    ("wrong", "fault", "says"),
+    [
+        ({"environment": "my.wkt"}, TypeError, "Environment.load"),
+        ({"kind": "round"}, ValueError, "inflection, aspect"),
+        ({"radius_m": -1.0}, ValueError, "at least 0"),
+    ],
+)
+def test_what_cannot_be_compiled_is_refused_at_once(wrong: dict, fault: type[Exception], says: str) -> None:
+    with pytest.raises(fault, match=says):
+        CompiledMap(**({"environment": Environment.load(maps.path("room1"))} | wrong))

@@ -203,3 +203,9 @@ def test_arguments_are_left_as_they_are(case: Case) -> None:
         solve(case, search, idle=False)
     assert np.array_equal(case.move, move)
     assert np.array_equal(case.W, weights)
+
+
+def test_a_team_of_one_may_idle_and_makes_no_chain() -> None:
+    assert redeploy([[2.0, 1.0]], [[0.0, 1.0], [1.0, 0.0]], idle=True).cells.tolist() == [1]
+    with pytest.raises(InvalidRedeployment, match="joins two nodes"):
+        redeploy([[2.0, 1.0]], [[0.0, 1.0], [1.0, 0.0]], search="chain")

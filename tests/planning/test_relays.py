@@ -16,7 +16,7 @@ from planning.environment import Environment
 from planning.mutual_visibility import mutual_visibility
 from planning.placement_graph import PlacementGraph
 from planning.relays import count_links, fewest_relays, join_terminals, most_relays
-from planning.tree import NoTree
+from planning.tree import InvalidRequest, NoTree
 from tests.planning.polygons import free_points
 
 Bools = NDArray[np.bool_]
@@ -137,3 +137,8 @@ def test_joined_terminals_keep_the_weights_of_both() -> None:
     W, links = np.array([[0.0, 2.0], [2.0, 0.0]]), np.array([[1.0, np.inf]])
     joined = join_terminals(W, links, np.full((1, 1), np.inf))
     assert joined.tolist() == [[0.0, 2.0, 1.0], [2.0, 0.0, np.inf], [1.0, np.inf, 0.0]]
+
+
+def test_weights_in_place_of_sight_are_refused_in_a_sentence() -> None:
+    with pytest.raises(InvalidRequest, match="isfinite"):
+        most_relays(np.array([[0.0, 1.0], [1.0, 0.0]]))
