@@ -1,4 +1,13 @@
-"""What a team is to do: for each member a path that is piecewise linear in time.
+"""What a team is to do: for each member a path that is piecewise linear in time, and who waits for whom.
+
+A path has nominal times: what happens if all drive at full speed and nobody is late. Robots are late, so a schedule is
+cut into *stages*, and robots advance by their own progress, under one rule:
+
+    nobody begins stage n + 2 before all have finished stage n.
+
+So at every instant all are within two stages that follow each other, whatever their speeds. Where that is not strict
+enough a planner puts a stage in which nobody moves between two others. A certificate by progress shows that all is well
+wherever in two such stages each member may be; then no clock is needed.
 
 These are values only. What makes them, and what judges them, are other modules: the certificate shares no code with the
 planners but this.
@@ -6,7 +15,7 @@ planners but this.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -80,6 +89,10 @@ class Schedule:
         radii_m: of each member's disc, or one for all, metres. A member of radius 0 has no body: it needs free space
             for its centre only, and is in nobody's way.
         speeds_m_s: the most that each member can drive, or one for all.
+        stages: (k, n + 1) int: the waypoint of each member at which each of n ≥ 1 stages begins, and the last one ends;
+            from 0 to the last waypoint, never falling. A stage that begins and ends with one waypoint is a stop. None:
+            a schedule that is bound to the clock.
+        unscheduled: members that go along their paths as they please: they wait for nobody and nobody for them.
 
     Raises:
         InvalidSchedule: these do not fit, or a radius or speed is negative or not a number.
@@ -91,9 +104,18 @@ class Schedule:
     """(k,) float."""
     speeds_m_s: Floats
     """(k,) float; inf for no limit."""
+    stages: NDArray[np.int64] | None
+    """(k, n + 1) int."""
+    unscheduled: frozenset[str]
 
     def __init__(
-        self, members: Sequence[str], paths: Sequence[TimedPath], radii_m: ArrayLike, speeds_m_s: ArrayLike = np.inf
+        self,
+        members: Sequence[str],
+        paths: Sequence[TimedPath],
+        radii_m: ArrayLike,
+        speeds_m_s: ArrayLike = np.inf,
+        stages: ArrayLike | None = None,
+        unscheduled: Collection[str] = (),
     ) -> None:
         if len(paths) != len(members) or not members or len(set(members)) < len(members):
             raise InvalidSchedule(
@@ -105,6 +127,10 @@ class Schedule:
         object.__setattr__(self, "speeds_m_s", self._spread(speeds_m_s, "greatest speed"))
         if np.isinf(self.radii_m).any():
             raise InvalidSchedule(f"{self.members[int(np.argmax(self.radii_m))]} has no finite radius: give metres")
+        object.__setattr__(self, "stages", None if stages is None else self._read_stages(stages))
+        object.__setattr__(self, "unscheduled", frozenset(unscheduled))
+        for name in self.unscheduled - set(self.members):
+            raise InvalidSchedule(f"'{name}' is unscheduled, but no member of the schedule: give it a path")
 
     def _spread(self, given: ArrayLike, name: str) -> Floats:
         values = np.array(given, dtype=np.float64)
@@ -117,8 +143,41 @@ class Schedule:
         values.flags.writeable = False
         return values
 
+    def _read_stages(self, given: ArrayLike) -> NDArray[np.int64]:
+        stages = np.array(given, dtype=np.int64)
+        if stages.ndim != 2 or len(stages) != len(self.members) or stages.shape[1] < 2:
+            raise InvalidSchedule(
+                f"stages of shape {stages.shape} for {len(self.members)} members: give each where every stage begins "
+                "and the last one ends"
+            )
+        for member, path, row in zip(self.members, self.paths, stages, strict=True):
+            if row[0] != 0 or row[-1] != len(path.waypoints) - 1 or np.any(np.diff(row) < 0):
+                raise InvalidSchedule(
+                    f"the stages of {member} are {row.tolist()}: give waypoints from 0 to {len(path.waypoints) - 1} "
+                    "that never fall"
+                )
+        stages.flags.writeable = False
+        return stages
+
     def __len__(self) -> int:
         return len(self.members)
+
+    @property
+    def stage_count(self) -> int:
+        """Number of stages; 0 for a schedule that is bound to the clock."""
+        return 0 if self.stages is None else self.stages.shape[1] - 1
+
+    def piece(self, member: int, first: int, last: int) -> Floats:
+        """The waypoints (m, 2), metres, of a member from the beginning of one stage to the end of another, m ≥ 1.
+
+        Of an unscheduled member they are all of its waypoints.
+        """
+        if self.stages is None:
+            raise InvalidSchedule("a schedule that is bound to the clock has no stages")
+        waypoints = self.paths[member].waypoints
+        if self.members[member] in self.unscheduled:
+            return waypoints
+        return waypoints[self.stages[member, first] : self.stages[member, last + 1] + 1]
 
     @property
     def start_s(self) -> float:

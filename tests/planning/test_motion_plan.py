@@ -65,3 +65,34 @@ def test_schedules_that_are_none_are_refused(members: list[str], radii: object, 
     paths = [TimedPath.standing((0, 0)), TimedPath.standing((1, 1))]
     with pytest.raises(InvalidSchedule, match=message):
         Schedule(members, paths, radii, speeds)  # type: ignore[arg-type]
+
+
+def test_stages_cut_paths_into_pieces() -> None:
+    paths = [TimedPath([(0, 0), (1, 0), (1, 0), (2, 0)], [0, 1, 3, 4]), TimedPath([(5, 5), (5, 7)], [1, 3])]
+    schedule = Schedule(["a", "b"], paths, 0.2, 1.0, stages=[[0, 1, 2, 3], [0, 0, 1, 1]])
+    assert schedule.stage_count == 3
+    assert schedule.piece(0, 0, 1).tolist() == [[0, 0], [1, 0], [1, 0]]
+    assert schedule.piece(1, 2, 2).tolist() == [[5, 7]]
+    assert Schedule(["a", "b"], paths, 0.2, 1.0).stage_count == 0
+
+
+def test_whoever_is_unscheduled_has_one_piece() -> None:
+    paths = [TimedPath([(0, 0), (1, 0)], [0, 1]), TimedPath([(5, 5), (5, 7)], [1, 3])]
+    schedule = Schedule(["a", "b"], paths, 0.2, 1.0, stages=[[0, 1, 1], [0, 0, 1]], unscheduled=["b"])
+    assert schedule.piece(1, 0, 0).tolist() == [[5, 5], [5, 7]]
+
+
+@pytest.mark.parametrize(
+    ("stages", "message"),
+    [
+        ([[0, 1]], "stages of shape"),
+        ([[0], [0]], "stages of shape"),
+        ([[0, 1], [0, 1]], "stages of b are"),
+        ([[1, 1], [0, 0]], "stages of a are"),
+        ([[0, 2, 1], [0, 0, 0]], "never fall"),
+    ],
+)
+def test_stages_that_are_none_are_refused(stages: list[list[int]], message: str) -> None:
+    paths = [TimedPath([(0, 0), (1, 0)], [0, 1]), TimedPath.standing((1, 1))]
+    with pytest.raises(InvalidSchedule, match=message):
+        Schedule(["a", "b"], paths, 0.2, stages=stages)
