@@ -43,11 +43,19 @@ Count: TypeAlias = Annotated[int, msgspec.Meta(ge=0, le=2**53 - 1)]
 Seconds: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0)]
 """A duration."""
 
+Extent: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=1e7)]
+"""A radius in metres, or a speed in metres per second."""
+
 RoleName: TypeAlias = Literal["base_station", "robot", "tracked_agent"]
 """What a peer is."""
 
-Mode: TypeAlias = Literal["waiting", "moving", "arrived", "holding"]
-"""What a peer's body does: it has no orders yet, drives, stands where it should, or its orders have run out."""
+Mode: TypeAlias = Literal["waiting", "moving", "yielding", "arrived", "holding"]
+"""What a peer's body does: it has no orders yet, drives, lets others go first, stands where it should, or stands since
+it was told to or has no order that it can follow."""
+
+Connection: TypeAlias = Literal["team", "joined", "none"]
+"""What is certified of lines of sight: that the whole team is one network at all times, that some of its members are in
+one network over any others, or nothing."""
 
 
 class Body(msgspec.Struct, frozen=True, kw_only=True, tag_field="kind"):
@@ -62,7 +70,7 @@ class Heartbeat(Body, frozen=True, kw_only=True, tag="heartbeat"):
 
 
 class State(Body, frozen=True, kw_only=True, tag="state"):
-    """Where a robot or the base station is and what it does. Sent at ``control_hz``."""
+    """Where a robot or the base station is and what it does. Sent at ``control_hz``, and when its progress changes."""
 
     position: Point
     velocity: Point
@@ -71,7 +79,12 @@ class State(Body, frozen=True, kw_only=True, tag="state"):
     path: tuple[Point, ...] = ()
     """What is left of the geodesic to ``target``, from ``position`` on."""
     obeying: Authority | None = None
-    """The command that the sender follows."""
+    """The latest command that the sender has heard."""
+    progress: Progress | None = None
+    """How far it is in the motion that it has accepted; none of a peer that has accepted none."""
+    refusing: Text = ""
+    """Why it does not accept the motion of the command that it obeys: it goes on with what it has accepted before, as
+    far as that was released. Empty if it accepts, or has not judged yet."""
 
 
 class Intent(Body, frozen=True, kw_only=True, tag="intent"):
@@ -109,6 +122,60 @@ class Authority(msgspec.Struct, frozen=True, kw_only=True):
     """Rises with every command of an epoch, repetitions included."""
 
 
+class Progress(msgspec.Struct, frozen=True, kw_only=True):
+    """How far a robot is in the team's motion."""
+
+    epoch: Count
+    """Of the authority under which the plan was made."""
+    plan: Count
+    """That it has accepted."""
+    revision: Count
+    """Of the motion that it has accepted: it knows no other stages."""
+    finished: Count
+    """Number of stages of the plan that it has finished: all below this one."""
+
+
+class MemberWay(msgspec.Struct, frozen=True, kw_only=True):
+    """The way of one member of a motion, cut into stages."""
+
+    member: Name
+    """A robot, the base station or the agent."""
+    radius_m: Extent
+    """Of its disc; 0 for a member that is in nobody's way."""
+    speed_m_s: Extent
+    """The most that it can drive."""
+    waypoints: Annotated[tuple[Point, ...], msgspec.Meta(min_length=1, max_length=1000)]
+    """Straight from each to the next; one alone: it stands."""
+    stages: Annotated[tuple[Count, ...], msgspec.Meta(min_length=2, max_length=1001)]
+    """The waypoint at which each stage begins and the last one ends: from 0 to the last waypoint, never falling. A
+    stage that begins and ends at one waypoint is a stop."""
+    scheduled: bool = True
+    """Whether it waits for the others and they for it. Otherwise it may be anywhere on its way at any time."""
+
+
+class Motion(msgspec.Struct, frozen=True, kw_only=True):
+    """Who goes where, in stages. Nobody begins stage n + 2 before all scheduled members have finished stage n.
+
+    Stages are numbered from 0 in each plan. A message contains those from ``first_stage`` on. A new plan follows on an
+    order to hold; within a plan, a revision changes none of the stages that have been released.
+    """
+
+    plan: Count
+    """Number of the plan in this epoch; rises with every fresh start."""
+    revision: Count
+    """Rises within a plan with every change of its stages."""
+    first_stage: Count
+    """Number of the first stage contained: all members have finished those before."""
+    released: Annotated[int, msgspec.Meta(ge=-1, le=2**53 - 1)]
+    """Number of the last stage that may be begun; ``first_stage`` - 1 if none of those contained. Never falls."""
+    ways: Annotated[tuple[MemberWay, ...], msgspec.Meta(min_length=1, max_length=64)]
+    """Of the members; all have as many stages."""
+    connection: Connection
+    """What the leader certifies of the stages contained."""
+    joined: Annotated[tuple[Name, ...], msgspec.Meta(max_length=64)] = ()
+    """The members that stay in one network where ``connection`` is ``joined``."""
+
+
 class Placement(msgspec.Struct, frozen=True, kw_only=True):
     """Where one robot is to stand."""
 
@@ -121,7 +188,7 @@ class Placement(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Deployment(Body, frozen=True, kw_only=True, tag="deployment"):
-    """The leader's standing order: who stands where, and which links make the chain. Repeated while it holds."""
+    """The leader's standing order: who goes where and how, and which links make the chain. Repeated while it holds."""
 
     authority: Authority
     valid_for_s: Seconds
@@ -141,6 +208,8 @@ class Deployment(Body, frozen=True, kw_only=True, tag="deployment"):
     relays_needed: Count
     reason: Text
     """Why this decision replaced the one before."""
+    motion: Motion | None = None
+    """How the robots get there; none: hold where you are. Placements alone send nobody anywhere."""
 
 
 AnyBody: TypeAlias = Heartbeat | State | Intent | Goal | GoalReply | Deployment

@@ -31,7 +31,10 @@ from protocol.messages import (
     GoalReply,
     Heartbeat,
     Intent,
+    MemberWay,
+    Motion,
     Placement,
+    Progress,
     State,
 )
 
@@ -39,7 +42,7 @@ DIALECT: Final = "https://json-schema.org/draft/2020-12/schema"
 
 SPEAKERS: Final = {
     "heartbeat": ("every peer", "at `heartbeat_hz`"),
-    "state": ("base station, robots", "at `control_hz`"),
+    "state": ("base station, robots", "at `control_hz`, and with every change of progress"),
     "intent": ("a tracked agent that announces", "at `control_hz`"),
     "goal": ("an operator", "when a person wants; again until replied"),
     "goal_reply": ("tracked agent", "for each goal heard"),
@@ -56,6 +59,7 @@ EXAMPLES: Final[tuple[AnyBody, ...]] = (
         target=(7.0, 3.0),
         path=((4.0, 2.5), (6.5, 2.5), (7.0, 3.0)),
         obeying=Authority(epoch=1, leader="base", sequence=42),
+        progress=Progress(epoch=1, plan=3, revision=1, finished=5),
     ),
     Intent(
         position=(9.0, 3.5),
@@ -80,6 +84,27 @@ EXAMPLES: Final[tuple[AnyBody, ...]] = (
         lower_bound_m=11.4,
         relays_needed=1,
         reason="the agent was about to leave the sight of the base",
+        motion=Motion(
+            plan=3,
+            revision=1,
+            first_stage=5,
+            released=5,
+            ways=(
+                MemberWay(member="base", radius_m=0.25, speed_m_s=0.0, waypoints=((1.0, 1.0),), stages=(0, 0, 0)),
+                MemberWay(
+                    member="robot1",
+                    radius_m=0.25,
+                    speed_m_s=0.6,
+                    waypoints=((4.0, 2.5), (6.5, 2.5), (7.0, 3.0)),
+                    stages=(0, 2, 2),
+                ),
+                MemberWay(
+                    member="robot2", radius_m=0.25, speed_m_s=0.6, waypoints=((9.0, 4.0), (9.0, 2.5)), stages=(0, 0, 1)
+                ),
+            ),
+            connection="joined",
+            joined=("base", "robot1"),
+        ),
     ),
 )
 
@@ -190,7 +215,7 @@ def _page() -> str:
     ]
     parts = [
         f"### {part.__name__}\n\n{_plain(inspect.getdoc(part) or '')}\n\n{_field_table(part)}"
-        for part in (Authority, Placement)
+        for part in (Authority, Progress, Motion, MemberWay, Placement)
     ]
     types: list[tuple[str, ...]] = [
         (f"`{name}`", f"`{json.dumps(msgspec.json.schema(getattr(messages, name)))}`".replace("|", "\\|"), meaning)
@@ -248,6 +273,8 @@ def _docstring(statement: ast.stmt | None) -> str:
 
 
 def _type(annotation: str) -> str:
+    if bounded := re.fullmatch(r"Annotated\[(.+), msgspec\.Meta\((.+)\)\]", annotation):
+        return f"{_type(bounded[1])} ({_limits(bounded[2])})"
     annotation = annotation.replace(" | None", " or null")
     annotation = re.sub(r"tuple\[(.+), \.\.\.\]", r"list of \1", annotation)
     annotation = re.sub(r"tuple\[(\w+), \1\]", r"pairs of \1", annotation)
@@ -256,10 +283,21 @@ def _type(annotation: str) -> str:
     )
 
 
+def _limits(arguments: str) -> str:
+    """Limits in words: ``ge=-1, le=5`` is at least -1, at most 5."""
+    words = {"ge": "at least", "le": "at most", "min_length": "at least", "max_length": "at most"}
+    limits = (argument.split("=") for argument in arguments.split(", "))
+    return ", ".join(f"{words[name]} {value}" for name, value in limits)
+
+
 def _readable(payload: bytes) -> str:
-    """Indented JSON, with points and pairs of names on one line."""
+    """Indented JSON, with lists of numbers or names on one line."""
     text = msgspec.json.format(payload, indent=2).decode()
-    return re.sub(r"\[\s+([^\s,]+),\s+([^\s,]+)\s+\]", r"[\1, \2]", text)
+    return re.sub(r"\[\s+((?:[^\s,\[{]+,\s+)*[^\s,\[{]+)\s+\]", _on_one_line, text)
+
+
+def _on_one_line(found: re.Match[str]) -> str:
+    return f"[{' '.join(found[1].split())}]"
 
 
 def _json(value: ast.expr) -> str:

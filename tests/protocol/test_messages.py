@@ -21,7 +21,10 @@ from protocol.messages import (
     Heartbeat,
     Intent,
     MalformedMessage,
+    MemberWay,
+    Motion,
     Placement,
+    Progress,
     State,
     decode,
     encode,
@@ -32,11 +35,32 @@ coordinates = st.floats(-1e7, 1e7)
 points = st.tuples(coordinates, coordinates)
 paths = st.lists(points, max_size=5).map(tuple)
 names = st.builds(str.__add__, st.sampled_from("aoz"), st.text("az09_", max_size=31))
-modes = st.sampled_from(["waiting", "moving", "arrived", "holding"])
+modes = st.sampled_from(["waiting", "moving", "yielding", "arrived", "holding"])
 texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=40)
 correlations = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=64)
 seconds = st.floats(0.0, 1e9)
 authorities = st.builds(Authority, epoch=counts, leader=names, sequence=counts)
+progresses = st.builds(Progress, epoch=counts, plan=counts, revision=counts, finished=counts)
+extents = st.floats(0.0, 1e7)
+ways = st.builds(
+    MemberWay,
+    member=names,
+    radius_m=extents,
+    speed_m_s=extents,
+    waypoints=st.lists(points, min_size=1, max_size=5).map(tuple),
+    stages=st.lists(counts, min_size=2, max_size=5).map(tuple),
+    scheduled=st.booleans(),
+)
+motions = st.builds(
+    Motion,
+    plan=counts,
+    revision=counts,
+    first_stage=counts,
+    released=st.integers(-1, 2**53 - 1),
+    ways=st.lists(ways, min_size=1, max_size=3).map(tuple),
+    connection=st.sampled_from(["team", "joined", "none"]),
+    joined=st.lists(names, max_size=3).map(tuple),
+)
 bodies = st.one_of(
     st.builds(Heartbeat, role=st.sampled_from(["base_station", "robot", "tracked_agent"]), mode=modes),
     st.builds(
@@ -47,6 +71,8 @@ bodies = st.one_of(
         target=st.none() | points,
         path=paths,
         obeying=st.none() | authorities,
+        progress=st.none() | progresses,
+        refusing=texts,
     ),
     st.builds(Intent, position=points, velocity=points, mode=modes, goal=st.none() | points, path=paths),
     st.builds(Goal, goal=points, correlation=correlations),
@@ -63,6 +89,7 @@ bodies = st.one_of(
         cost=st.floats(allow_nan=False, allow_infinity=False),
         relays_needed=counts,
         reason=texts,
+        motion=st.none() | motions,
     ),
 )
 envelopes = st.builds(Envelope, sender=names, incarnation=counts, sequence=counts, sent_at_s=seconds, body=bodies)
@@ -167,6 +194,39 @@ def test_what_does_not_fit_the_schema_is_malformed(old: bytes, new: bytes) -> No
     assert old in STATE
     with pytest.raises(MalformedMessage):
         decode(STATE.replace(old, new))
+
+
+def motion_of(waypoints: int = 1, marks: int = 2, ways: int = 1, joined: int = 0, released: int = -1) -> bytes:
+    way = MemberWay(
+        member="robot1", radius_m=0.2, speed_m_s=1.0, waypoints=((0.0, 0.0),) * waypoints, stages=(0,) * marks
+    )
+    motion = Motion(
+        plan=0, revision=0, first_stage=0, released=released, ways=(way,) * ways, connection="none",
+        joined=("robot1",) * joined,
+    )  # fmt: skip
+    body = Deployment(
+        authority=Authority(epoch=0, leader="base", sequence=1), valid_for_s=1.0, decision=1, placements=(), edges=(),
+        cost=0.0, relays_needed=0, reason="", motion=motion,
+    )  # fmt: skip
+    return encode(Envelope(sender="base", incarnation=0, sequence=1, sent_at_s=0.0, body=body))
+
+
+@pytest.mark.parametrize(
+    ("size", "least", "most"), [("waypoints", 1, 1000), ("marks", 2, 1001), ("ways", 1, 64), ("joined", 0, 64)]
+)
+def test_motions_are_bounded(size: str, least: int, most: int) -> None:
+    for fits in (least, most):
+        decode(motion_of(**{size: fits}))
+    for unfit in (least - 1, most + 1):
+        if unfit >= 0:
+            with pytest.raises(MalformedMessage):
+                decode(motion_of(**{size: unfit}))
+
+
+def test_no_stage_comes_before_the_first() -> None:
+    assert decode(motion_of(released=-1)).kind == "deployment"
+    with pytest.raises(MalformedMessage):
+        decode(motion_of(released=-2))
 
 
 def test_unknown_fields_are_ignored() -> None:
