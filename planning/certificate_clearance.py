@@ -128,6 +128,29 @@ def find_contacts(times: Floats, points: Floats, walls: Floats, reach: float) ->
 
 
 @kernel
+def approach(
+    px: float, py: float, rx: float, ry: float, qx: float, qy: float, sx: float, sy: float
+) -> tuple[float, float, float]:
+    """The least distance of a segment from p to r to another from q to s, and the place on the first where it is."""
+    ux, uy, vx, vy = rx - px, ry - py, sx - qx, sy - qy
+    if _crosses(px, py, rx, ry, qx, qy, sx, sy):
+        side_p, side_r = vx * (py - qy) - vy * (px - qx), vx * (ry - qy) - vy * (rx - qx)
+        share = side_p / (side_p - side_r)
+        return 0.0, px + share * ux, py + share * uy
+    nearest, x, y = _distance_to_segment(px, py, qx, qy, sx, sy), px, py
+    distance = _distance_to_segment(rx, ry, qx, qy, sx, sy)
+    if distance < nearest:
+        nearest, x, y = distance, rx, ry
+    squared = ux * ux + uy * uy
+    for ax, ay in ((qx, qy), (sx, sy)):
+        distance = _distance_to_segment(ax, ay, px, py, rx, ry)
+        if distance < nearest and squared > 0.0:
+            share = min(1.0, max(0.0, (ux * (ax - px) + uy * (ay - py)) / squared))
+            nearest, x, y = distance, px + share * ux, py + share * uy
+    return nearest, x, y
+
+
+@kernel
 def find_collisions(times: Floats, p: Floats, q: Floats, reach: float) -> Floats:
     """When two members are nearer to each other than ``reach``, metres.
 

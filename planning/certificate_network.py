@@ -7,6 +7,7 @@ to look between.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,7 +31,7 @@ class Break:
     lost: tuple[tuple[int, int], ...]
     """Links that end at the start and join different parts."""
     between: tuple[int, int]
-    """The ends that should be joined; of a team a link that was lost, or the lowest members of two parts."""
+    """Two of the ends that should be joined; of a team a link that was lost, or the lowest members of two parts."""
 
 
 def find_gaps(intervals: Floats, start_s: float, end_s: float) -> list[tuple[float, float]]:
@@ -42,16 +43,16 @@ def find_gaps(intervals: Floats, start_s: float, end_s: float) -> list[tuple[flo
 
 
 def find_breaks(
-    sight: dict[tuple[int, int], Floats], members: int, start_s: float, end_s: float, ends: tuple[int, int] | None
+    sight: dict[tuple[int, int], Floats], members: int, start_s: float, end_s: float, ends: Sequence[int] | None
 ) -> list[Break]:
-    """When the network does not join two ends, or all members.
+    """When the network does not join what it should: some members, the ends, or all.
 
     Args:
         sight: for every pair of members (i < j) the closed intervals (n, 2), seconds, in which they see each other.
         members: how many there are.
         start_s: of the time to look at.
         end_s: the same, or later.
-        ends: two members; None for all.
+        ends: two members or more; None for all.
 
     Complexity: O(l k³) for k members and l beginnings and ends of sight.
     """
@@ -67,14 +68,16 @@ def find_breaks(
         for start, end in np.searchsorted(times, intervals):
             row[start:end] = True
     labels: Ints = _label_parts(held, pairs, members)
-    joined = np.all(labels == 0, axis=1) if ends is None else labels[:, ends[0]] == labels[:, ends[1]]
+    asked = np.arange(members) if ends is None else np.array(ends)
+    joined = np.all(labels[:, asked] == labels[:, asked[:1]], axis=1)
     found = []
     for first in np.flatnonzero(~joined & np.append(True, joined[:-1])):
         last = first + int(np.argmax(np.append(joined[first:], True)))
         label = labels[first]
-        apart = label[pairs[:, 0]] != label[pairs[:, 1]]
-        lost = [(int(i), int(j)) for i, j in pairs[apart & held[:, first - 1]]] if first > 0 else []
-        between = ends or (lost[0] if lost else (0, int(np.argmax(label > 0))))
+        outer = label[pairs[:, 0]] != label[pairs[:, 1]]
+        lost = [(int(i), int(j)) for i, j in pairs[outer & held[:, first - 1]]] if first > 0 else []
+        apart = (int(asked[0]), int(asked[np.argmax(label[asked] != label[asked[0]])]))
+        between = lost[0] if lost and ends is None else apart
         parts = tuple(int(part) for part in label)
         found.append(Break(float(times[first]), float(times[last]), parts, tuple(lost), between))
     return found

@@ -50,6 +50,7 @@ def exercise() -> None:
     sees_throughout(rooms, points[:2], points[2:])
     two = Schedule(["a", "b"], [TimedPath(points[:2], [0.0, 1.0]), TimedPath.standing(points[2])], 0.2)
     certify(two, rooms)
+    certify(Schedule(two.members, two.paths, 0.2, stages=[(0, 1), (0, 0)]), rooms, links=[("a", "b")], ends=("a", "b"))
     graph = PlacementGraph.from_points(rooms, 0.2, 2.0)
     graph.distances_from(points[0])
     _ = graph.distances
