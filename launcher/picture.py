@@ -28,15 +28,15 @@ _LONGEST_SIDE_IN = 18.0
 _DOTS_PER_IN = 160
 
 _SOLID = "#b9c0c9"
-_WALL = "#1d2329"
+WALL = "#1d2329"
 _FLOOR = "#ffffff"
 _CELL = "#8fa9c4"
-_SIGHT = "#e07b00"
-_BASE = "#1f4e8c"
-_RELAY = "#16856b"
-_AGENT = "#b3262e"
+SIGHT = "#e07b00"
+BASE = "#1f4e8c"
+RELAY = "#16856b"
+AGENT = "#b3262e"
 _MOVE = "#5b4b8a"
-_IDLE = "#7a828c"
+IDLE = "#7a828c"
 
 
 _APART_PT = 11.0
@@ -60,8 +60,8 @@ def draw_map(environment: Environment, polygons: Sequence[Floats] | None, file: 
     Raises:
         BadPicture: the file has another suffix or cannot be written.
     """
-    figure, _ = _draw_floor(environment, polygons, file, title)
-    _write(figure, file)
+    figure, _ = draw_floor(environment, polygons, file, title)
+    write_picture(figure, file)
 
 
 def draw_plan(
@@ -98,40 +98,49 @@ def draw_plan(
     """
     from matplotlib.collections import LineCollection
 
-    figure, axes = _draw_floor(environment, polygons, file, title)
-    axes.add_collection(LineCollection(list(links), colors=_SIGHT, linewidths=2, zorder=4))
-    axes.plot([], [], color=_SIGHT, linewidth=2, label="line of sight")
+    figure, axes = draw_floor(environment, polygons, file, title)
+    axes.add_collection(LineCollection(list(links), colors=SIGHT, linewidths=2, zorder=4))
+    axes.plot([], [], color=SIGHT, linewidth=2, label="line of sight")
     _draw_ways(axes, [way for way in ways if len(way) > 1])
     numbers = [str(number) for number in range(1, len(ways or relays) + 1)]
     idle = {name: way[0] for name, way in zip(numbers, ways, strict=False) if len(way) == 1}
     names = [name for name in numbers if name not in idle]
     kinds = [
-        ("s", _BASE, "base", [base], ["B"]),
-        ("o", _RELAY, "relay", relays, names),
-        ("o", _IDLE, "idle", [*idle.values()], [*idle]),
-        ("D", _AGENT, "agent", agents, ["A"] if len(agents) == 1 else [f"A{i}" for i in range(1, len(agents) + 1)]),
+        ("s", BASE, "base", [base], ["B"]),
+        ("o", RELAY, "relay", relays, names),
+        ("o", IDLE, "idle", [*idle.values()], [*idle]),
+        ("D", AGENT, "agent", agents, ["A"] if len(agents) == 1 else [f"A{i}" for i in range(1, len(agents) + 1)]),
     ]
     places = np.array([place for *_, these, _ in kinds for place in these], dtype=float)
-    shown = _spread(axes, places)
+    shown = spread_markers(axes, places)
     axes.add_collection(
-        LineCollection(list(np.stack([places, shown], axis=1)), colors=_WALL, linewidths=0.6, zorder=4.8)
+        LineCollection(list(np.stack([places, shown], axis=1)), colors=WALL, linewidths=0.6, zorder=4.8)
     )
     begin = 0
     for marker, colour, kind, these, labels in kinds:
-        _draw_peers(axes, shown[begin : begin + len(these)], marker, colour, kind, labels)
+        draw_markers(axes, shown[begin : begin + len(these)], marker, colour, kind, labels)
         begin += len(these)
     axes.legend(
         loc="upper center", bbox_to_anchor=(0.5, -0.5 / figure.get_figheight()), ncols=6, frameon=False, fontsize=8
     )
-    _write(figure, file)
+    write_picture(figure, file)
 
 
-def _draw_floor(
+def check_format(file: Path) -> None:
+    """Raise where a file's suffix is none of those that pictures are written as.
+
+    Raises:
+        BadPicture: one sentence.
+    """
+    if file.suffix.lower() not in _FORMATS:
+        raise BadPicture(f"{file}: pictures are written as {', '.join(_FORMATS)}: give a name that ends so")
+
+
+def draw_floor(
     environment: Environment, polygons: Sequence[Floats] | None, file: Path, title: str
 ) -> tuple[Figure, Axes]:
     """A new figure with the map to scale; whatever is not free is solid."""
-    if file.suffix.lower() not in _FORMATS:
-        raise BadPicture(f"{file}: pictures are written as {', '.join(_FORMATS)}: give a name that ends so")
+    check_format(file)
     from matplotlib.collections import PolyCollection
     from matplotlib.figure import Figure
     from matplotlib.patches import PathPatch, Rectangle
@@ -154,7 +163,7 @@ def _draw_floor(
         axes.add_collection(
             PolyCollection(list(polygons), facecolors="none", edgecolors=_CELL, linewidths=0.35, zorder=2)
         )
-    axes.add_patch(PathPatch(walls, facecolor="none", edgecolor=_WALL, linewidth=1.2, joinstyle="miter", zorder=3))
+    axes.add_patch(PathPatch(walls, facecolor="none", edgecolor=WALL, linewidth=1.2, joinstyle="miter", zorder=3))
     axes.set_title(title, fontsize=11, loc="left", pad=8, parse_math=False)
     axes.set_xlabel("x [m]", fontsize=8)
     axes.set_ylabel("y [m]", fontsize=8)
@@ -187,7 +196,7 @@ def _draw_ways(axes: Axes, ways: Sequence[Sequence[Point]]) -> None:
     axes.plot([], [], color=_MOVE, linewidth=1.2, linestyle="--", label="movement")
 
 
-def _spread(axes: Axes, places: Floats) -> Floats:
+def spread_markers(axes: Axes, places: Floats) -> Floats:
     """Where to draw markers (n, 2) so that none covers another: those too near push each other apart."""
     scale = 72 / (_APART_PT * axes.figure.dpi)  # the unit is what two markers need
     turns = 2.4 * np.arange(len(places))
@@ -207,7 +216,7 @@ def _spread(axes: Axes, places: Floats) -> Floats:
     return np.where(pushed[:, None], axes.transData.inverted().transform(shown / scale), places)
 
 
-def _draw_peers(axes: Axes, places: Floats, marker: str, colour: str, kind: str, labels: Sequence[str]) -> None:
+def draw_markers(axes: Axes, places: Floats, marker: str, colour: str, kind: str, labels: Sequence[str]) -> None:
     """Markers (n, 2) of one kind of peer, with a label each, and their entry in the legend."""
     if not len(places):
         return
@@ -227,7 +236,12 @@ def _draw_peers(axes: Axes, places: Floats, marker: str, colour: str, kind: str,
         )
 
 
-def _write(figure: Figure, file: Path) -> None:
+def write_picture(figure: Figure, file: Path) -> None:
+    """Write a figure with all that is drawn around its axes.
+
+    Raises:
+        BadPicture: the file cannot be written.
+    """
     try:
         figure.savefig(file, dpi=_DOTS_PER_IN, bbox_inches="tight", facecolor="white")
     except OSError as fault:

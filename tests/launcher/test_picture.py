@@ -33,7 +33,7 @@ def test_a_map_shows_floor_and_solid_in_the_right_places_to_scale(tmp_path: Path
     draw_map(ROOM, None, tmp_path / "map.png", "room")
     with Image.open(tmp_path / "map.png") as image:
         pixels = np.asarray(image.convert("RGB"))
-    wall = np.argwhere((pixels == hexadecimal(picture._WALL)).all(axis=2))
+    wall = np.argwhere((pixels == hexadecimal(picture.WALL)).all(axis=2))
     (top, left), (bottom, right) = wall.min(axis=0), wall.max(axis=0)
     dots_per_m = (right - left) / 12
     assert (bottom - top) / 8 == pytest.approx(dots_per_m, rel=0.01)
@@ -59,7 +59,7 @@ def test_a_plan_shows_base_relays_agents_and_links(tmp_path: Path) -> None:
     relays = [(1.0, 7.0), (9.0, 7.0)]
     links = [((1.0, 1.0), relays[0]), (relays[0], relays[1]), (relays[1], (11.0, 1.0))]
     draw_plan(ROOM, CELLS, (1.0, 1.0), [(11.0, 1.0)], relays, links, tmp_path / "plan.png", "2 relays")
-    wanted = {hexadecimal(c) for c in (picture._BASE, picture._RELAY, picture._AGENT, picture._SIGHT)}
+    wanted = {hexadecimal(c) for c in (picture.BASE, picture.RELAY, picture.AGENT, picture.SIGHT)}
     assert wanted <= colours(tmp_path / "plan.png")
 
 
@@ -97,7 +97,7 @@ def test_ways_are_drawn_round_walls(tmp_path: Path) -> None:
     draw_plan(ROOM, None, (1.0, 1.0), [(11.0, 1.0)], [way[-1]], [], tmp_path / "plan.png", "round", ways=[way])
     with Image.open(tmp_path / "plan.png") as image:
         pixels = np.asarray(image.convert("RGB"))
-    wall = np.argwhere((pixels == hexadecimal(picture._WALL)).all(axis=2))
+    wall = np.argwhere((pixels == hexadecimal(picture.WALL)).all(axis=2))
     left, (bottom, right) = wall[:, 1].min(), wall.max(axis=0)
     dots_per_m = (right - left) / 12
     drawn = np.argwhere((pixels == hexadecimal(picture._MOVE)).all(axis=2))
@@ -116,7 +116,7 @@ def test_no_marker_covers_another() -> None:
     axes = Figure(figsize=(9, 6)).add_axes((0, 0, 1, 1))
     axes.set(xlim=(0, 12), ylim=(0, 8))
     places = np.array([(2.0, 2.0)] * 5 + [(2.05, 2.0), (9.0, 5.0), (9.01, 5.0), (6.0, 4.0)])
-    shown = picture._spread(axes, places)
+    shown = picture.spread_markers(axes, places)
     points = axes.transData.transform(shown) * 72 / axes.figure.dpi
     apart = np.linalg.norm(points[:, None] - points, axis=2)[np.triu_indices(len(points), 1)]
     assert apart.min() > 0.98 * picture._APART_PT
