@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from planning.geodesic import GeodesicMap
     from planning.motion_plan import Schedule, TimedPath
     from planning.mutual_visibility import mutual_visibility
+    from planning.no_schedule import NoSchedule
     from planning.physical_weights import (
         adjacency_path_weights,
         arrival_times,
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from planning.placement_graph import PlacementGraph
     from planning.redeployment import Redeployment, redeploy
     from planning.relays import MostRelays, RelayTree, fewest_relays, most_relays
+    from planning.schedule import schedule
     from planning.shortest_paths import all_pairs, from_source
     from planning.steiner import steiner_tree
     from planning.tree import Tree
@@ -50,6 +52,7 @@ __all__ = [
     "Environment",
     "GeodesicMap",
     "MostRelays",
+    "NoSchedule",
     "PlacementGraph",
     "Redeployment",
     "RelayTree",
@@ -76,6 +79,7 @@ __all__ = [
     "mutual_visibility",
     "physical_cost",
     "redeploy",
+    "schedule",
     "shortest_path_deployment",
     "steiner_tree",
     "virtual_weights",
@@ -92,6 +96,7 @@ _HOMES = {
     "Environment": "planning.environment",
     "GeodesicMap": "planning.geodesic",
     "MostRelays": "planning.relays",
+    "NoSchedule": "planning.no_schedule",
     "PlacementGraph": "planning.placement_graph",
     "Redeployment": "planning.redeployment",
     "RelayTree": "planning.relays",
@@ -118,6 +123,7 @@ _HOMES = {
     "mutual_visibility": "planning.mutual_visibility",
     "physical_cost": "planning.deployment_sequence",
     "redeploy": "planning.redeployment",
+    "schedule": "planning.schedule",
     "shortest_path_deployment": "planning.deployment",
     "steiner_tree": "planning.steiner",
     "virtual_weights": "planning.edge_weights",

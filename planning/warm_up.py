@@ -23,6 +23,7 @@ def exercise() -> None:
     from planning.placement import reachable_positions
     from planning.placement_graph import PlacementGraph
     from planning.redeployment import redeploy
+    from planning.schedule import schedule
     from planning.shortest_paths import all_pairs, from_source
     from planning.steiner import steiner_tree
     from planning.visible_interval import sees_throughout, visible_intervals, visible_times
@@ -50,6 +51,7 @@ def exercise() -> None:
     sees_throughout(rooms, points[:2], points[2:])
     two = Schedule(["a", "b"], [TimedPath(points[:2], [0.0, 1.0]), TimedPath.standing(points[2])], 0.2)
     certify(two, rooms)
+    schedule([points[2:3], [(8.0, 4.0), (1.0, 4.0)], [(10.0, 4.0), (17.0, 4.0)]], 0.2, rooms)
     certify(Schedule(two.members, two.paths, 0.2, stages=[(0, 1), (0, 0)]), rooms, links=[("a", "b")], ends=("a", "b"))
     graph = PlacementGraph.from_points(rooms, 0.2, 2.0)
     graph.distances_from(points[0])

@@ -1,0 +1,176 @@
+"""Steps made into stages, as long as they can be, and the earliest times at which they are driven.
+
+A schedule in stages is a row of *cuts*: the nodes at which each stage begins and the last one ends. Members are always
+within two stages that follow each other, so the rule for cuts c is: the box of all places between c_n and c_(n+2) is in
+order, for every n. Any cuts taken from the states of an order keep to its way; the more states between two cuts, the
+less the members wait for each other. Where only the box of one stage is in order, an empty stage follows it (a cut
+given twice), and all wait for all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.kernel import kernel
+from planning.motion_plan import TimedPath
+from planning.order_search import Demand, is_joined
+from planning.pair_tables import APART, SEES, PairTables
+from planning.path_elements import PathElements
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bytes = NDArray[np.uint8]
+
+
+def choose_cuts(states: Ints, tables: PairTables, demand: Demand) -> Ints:
+    """Which of the states (m, k) are cuts: (n + 1,) int, rising or staying, n ≥ 1."""
+    faults = _count_faults(tables.bits, tables.starts, tables.sizes)
+    cuts: Ints = _choose(states, faults, tables.starts, tables.sizes, demand.joined, demand.links)
+    return cuts
+
+
+@kernel
+def _count_faults(bits: Bytes, starts: Ints, sizes: Ints) -> Ints:
+    """How many elements before each one, in both directions, are not apart, and how many do not see each other.
+
+    (n, 2) int, in place of ``bits`` (n,): the sums are inclusive.
+    """
+    faults = np.zeros((bits.shape[0], 2), np.int64)
+    k = sizes.shape[0]
+    for i in range(k):
+        for j in range(i):
+            at = starts[i, j]
+            width = sizes[j]
+            for a in range(sizes[i]):
+                near, hidden = 0, 0
+                for _ in range(width):
+                    pair = bits[at]
+                    near += pair & APART == 0
+                    hidden += pair & SEES == 0
+                    faults[at, 0] = near + (faults[at - width, 0] if a > 0 else 0)
+                    faults[at, 1] = hidden + (faults[at - width, 1] if a > 0 else 0)
+                    at += 1
+    return faults
+
+
+@kernel
+def _sum_faults(faults: Ints, start: int, width: int, a: int, b: int, c: int, d: int, kind: int) -> int:
+    """Of the elements from a to b of one member and from c to d of another."""
+    total = int(faults[start + b * width + d, kind])
+    if a > 0:
+        total -= faults[start + (a - 1) * width + d, kind]
+    if c > 0:
+        total -= faults[start + b * width + c - 1, kind]
+    if a > 0 and c > 0:
+        total += faults[start + (a - 1) * width + c - 1, kind]
+    return total
+
+
+@kernel
+def _box_is_free(
+    low: Ints, high: Ints, faults: Ints, starts: Ints, sizes: Ints, joined: int, links: Ints, adjacent: Ints
+) -> bool:
+    """Whether all is in order wherever from node ``low`` to node ``high`` each member may be."""
+    k = low.shape[0]
+    adjacent[:] = 0
+    for i in range(k):
+        for j in range(i):
+            a, b, c, d = 2 * low[i], 2 * high[i], 2 * low[j], 2 * high[j]
+            if _sum_faults(faults, starts[i, j], sizes[j], a, b, c, d, 0) > 0:
+                return False
+            if _sum_faults(faults, starts[i, j], sizes[j], a, b, c, d, 1) == 0:
+                adjacent[i] |= 1 << j
+                adjacent[j] |= 1 << i
+    for i in range(k):
+        if links[i] & ~adjacent[i]:
+            return False
+    return is_joined(adjacent, joined)
+
+
+@kernel
+def _choose(states: Ints, faults: Ints, starts: Ints, sizes: Ints, joined: int, links: Ints) -> Ints:
+    n = states.shape[0] - 1
+    adjacent = np.empty(states.shape[1], np.int64)
+    # How far the box of two stages that begin at each state may reach.
+    reach = np.empty(n + 1, np.int64)
+    for s in range(n + 1):
+        low, high = states[s].copy(), states[s].copy()
+        reach[s] = s
+        for t in range(s + 1, n + 1):
+            low, high = np.minimum(low, states[t]), np.maximum(high, states[t])
+            if not _box_is_free(low, high, faults, starts, sizes, joined, links, adjacent):
+                break
+            reach[s] = t
+    cuts = np.empty(2 * n + 2, np.int64)
+    cuts[0] = 0
+    count = 1
+    if reach[0] == n:
+        cuts[1] = n
+        return cuts[:2]
+    while cuts[count - 1] < n:
+        here = cuts[count - 1]
+        until = n if count == 1 else reach[cuts[count - 2]]
+        middle = (here + reach[here] + 1) // 2
+        cuts[count] = max(here, min(until, middle))
+        count += 1
+    return cuts[:count].copy()
+
+
+def time_stages(
+    states: Ints, elements: Sequence[PathElements], speeds_m_s: Floats, anywhere: Sequence[int]
+) -> tuple[list[TimedPath], Ints]:
+    """The earliest execution of stages under the rule of progress.
+
+    Args:
+        states: (n + 1, k) int: the nodes at which each stage begins, and the last one ends.
+        elements: of each path.
+        speeds_m_s: (k,) float, positive.
+        anywhere: the members that go along their whole paths as they please, and wait for nobody.
+
+    Returns:
+        paths: k paths; they start at 0 s.
+        stages: (k, n + 1) int: their waypoints at the cuts.
+    """
+    stages, members = len(states) - 1, len(elements)
+    finish = np.zeros((members, stages + 1))
+    paths = []
+    rows = np.zeros((members, stages + 1), dtype=np.int64)
+    waypoints: list[list[Floats]] = [[path.nodes[0]] for path in elements]
+    times: list[list[float]] = [[0.0] for _ in elements]
+    scheduled = [i for i in range(members) if i not in anywhere]
+    done = 0.0  # when all have finished the stage before the last one
+    for n in range(stages):
+        if n > 1:
+            done = float(finish[scheduled, n - 1].max(initial=0.0))
+        for i in scheduled:
+            a, b = int(states[n, i]), int(states[n + 1, i])
+            finish[i, n + 1] = finish[i, n]
+            if a != b:
+                begin = max(float(finish[i, n]), done)
+                if begin > times[i][-1]:
+                    waypoints[i].append(waypoints[i][-1])
+                    times[i].append(begin)
+                for node in _turns(elements[i], a, b):
+                    place = elements[i].nodes[node]
+                    way = float(np.hypot(*(place - waypoints[i][-1])))
+                    waypoints[i].append(place)
+                    times[i].append(times[i][-1] + way / speeds_m_s[i])
+                finish[i, n + 1] = times[i][-1]
+            rows[i, n + 1] = len(waypoints[i]) - 1
+    for i in anywhere:
+        corners = elements[i].nodes[elements[i].corners]
+        steps = np.hypot(*np.diff(corners, axis=0).T) / speeds_m_s[i]
+        waypoints[i], times[i] = list(corners), [0.0, *np.cumsum(steps).tolist()]
+        rows[i, -1] = len(corners) - 1
+    paths = [TimedPath(np.array(w), t) for w, t in zip(waypoints, times, strict=True)]
+    return paths, rows
+
+
+def _turns(path: PathElements, a: int, b: int) -> list[int]:
+    """The corners between two nodes, in the order in which they are passed, and the second node."""
+    low, high = min(a, b), max(a, b)
+    between = [int(c) for c in path.corners if low < c < high]
+    return [*(between if a < b else between[::-1]), b]
