@@ -118,7 +118,7 @@ class DeploymentPlanner:
             _check_number(compiled)
         self.graph = compiled.point_placements(spacing_m) if placements == "points" else compiled.cell_placements
         self._geodesics = self.graph.geodesics
-        self._waiting = Waiting(self._geodesics, robot_radius_m)
+        self._waiting = Waiting(self._geodesics, robot_radius_m, self.graph.positions)
         self._proposer = Proposer(
             self.graph, base, search, robot_speed_m_s=robot_speed_m_s, agent_speed_m_s=agent_speed_m_s
         )

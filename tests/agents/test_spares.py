@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from itertools import combinations
 
+import numpy as np
 import pytest
 
 from agents.spares import SETTLED_M, Waiting
@@ -19,7 +20,9 @@ CHAIN = [(2.0, 9.0), (4.0, 4.0)]
 
 @pytest.fixture
 def waiting(corner: Environment) -> Waiting:
-    return Waiting(GeodesicMap(corner.inflated(RADIUS_M)), RADIUS_M)
+    free = corner.inflated(RADIUS_M)
+    refuges = np.array([(x, y) for x in np.arange(0.5, 10.0, 1.0) for y in np.arange(0.5, 10.0, 1.0)])
+    return Waiting(GeodesicMap(free), RADIUS_M, refuges[free.contains(refuges)])
 
 
 def _spares(number: int) -> dict[str, Point]:
@@ -53,9 +56,30 @@ def test_a_spare_does_not_move_for_a_trifle(waiting: Waiting) -> None:
 
 def test_those_that_there_is_no_room_for_stay(waiting: Waiting) -> None:
     beside_the_base = (2.5, 9.0)
-    assert waiting.places(beside_the_base, CHAIN[:1], _spares(4), {}) == _spares(4)
-    sent = {name: (3.0, y) for name, y in zip(_spares(4), (1.0, 2.0, 3.0, 4.0), strict=True)}
-    assert waiting.places(beside_the_base, CHAIN[:1], _spares(4), sent) == sent
+    spares = {f"robot{place}": (0.5 + 0.6 * place, 7.0) for place in range(4)}
+    assert waiting.places(beside_the_base, CHAIN[:1], spares, {}) == spares
+    sent = {name: (3.0, y) for name, y in zip(spares, (1.0, 2.0, 3.0, 4.0), strict=True)}
+    assert waiting.places(beside_the_base, CHAIN[:1], spares, sent) == sent
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_all_places_are_apart(waiting: Waiting, corner: Environment, seed: int) -> None:
+    """Wherever the spares are and were sent, even in one place: nobody is to stand where another or a relay stands."""
+    chance = np.random.default_rng(seed)
+    free = corner.inflated(RADIUS_M)
+    drawn = chance.uniform(0.0, 10.0, (200, 2))
+    places: list[Point] = [(x, y) for x, y in drawn[free.contains(drawn)].tolist()]
+    agent, *rest = places
+    relays, obstacles = [(2.0, 9.0), (4.0, 4.0), *rest[: seed % 2]], rest[2:4]
+    spares = {f"robot{number}": relays[number % len(relays)] for number in range(5)}
+    before = {name: rest[4 + number // 2] for number, name in enumerate(spares)} if seed % 3 else {}
+    found = waiting.places(agent, relays, spares, before, obstacles)
+    assert free.contains(list(found.values())).all()
+    fixed = [*relays[1:], *obstacles]
+    for place in found.values():
+        assert all(math.dist(place, other) > waiting.apart_m - 1e-5 for other in fixed)
+    for one, other in combinations(found.values(), 2):
+        assert math.dist(one, other) > waiting.apart_m - 1e-5
 
 
 def test_nobody_spare_asks_for_nothing(waiting: Waiting) -> None:
