@@ -212,15 +212,68 @@ class Deployment(Body, frozen=True, kw_only=True, tag="deployment"):
     """How the robots get there; none: hold where you are. Placements alone send nobody anywhere."""
 
 
-AnyBody: TypeAlias = Heartbeat | State | Intent | Goal | GoalReply | Deployment
+class Reign(msgspec.Struct, frozen=True, kw_only=True):
+    """Who leads in an epoch, and which process of that name. No two leaders share an epoch."""
+
+    epoch: Count
+    leader: Name
+    incarnation: Count
+    """Of the leader: started again, it has to be elected again."""
+
+
+class LastHeard(msgspec.Struct, frozen=True, kw_only=True):
+    """The latest mark that a speaker had heard of a peer."""
+
+    peer: Name
+    mark: Correlation
+
+
+class Warrant(msgspec.Struct, frozen=True, kw_only=True):
+    """How long what a leader says may be obeyed; each hearer judges on its own clock how old it is.
+
+    Obey for ``lease_s`` from when you said the mark of yours that is in ``marks``, and not at all without one of this
+    incarnation. The leader had heard that mark before it spoke, so that delay makes orders run out sooner, not later.
+    """
+
+    lease_s: Seconds
+    """What was left of the leader's lease when it spoke, by its own clock and with its caution."""
+    marks: Annotated[tuple[LastHeard, ...], msgspec.Meta(max_length=64)]
+
+
+class VoteRequest(Body, frozen=True, kw_only=True, tag="vote_request"):
+    """Promise me the lease of this epoch, or renew your promise. Said in rounds by who stands for leader or leads."""
+
+    epoch: Count
+    correlation: Correlation
+    """Of this round."""
+    warrant: Warrant | None = None
+    """Of a leader in office; none while it only stands."""
+    withdrawn: bool = False
+    """It no longer stands and will never lead in this epoch: promises made for it are void. No answer is wanted."""
+
+
+class Vote(Body, frozen=True, kw_only=True, tag="vote"):
+    """The answer to a :class:`VoteRequest`. Peers that have no vote answer too: what is obeyed depends on marks."""
+
+    candidate: Name
+    correlation: Correlation
+    granted: bool
+    """Whether nobody else will be promised a lease from now on for as long as one lasts."""
+    promise: Reign | None = None
+    """The last one made; kept on disk before it is said."""
+    mark: Correlation
+    """Chosen by the voter, another one each time that time has passed; comes back in warrants."""
+
+
+AnyBody: TypeAlias = Heartbeat | State | Intent | Goal | GoalReply | Deployment | VoteRequest | Vote
 
 BODIES: dict[str, type[Body]] = {
     body.__struct_config__.tag: body  # type: ignore[misc]
-    for body in (Heartbeat, State, Intent, Goal, GoalReply, Deployment)
+    for body in (Heartbeat, State, Intent, Goal, GoalReply, Deployment, VoteRequest, Vote)
 }
 """Kind → body."""
 
-PERIODIC_KINDS: Final = frozenset({"heartbeat", "state", "intent"})
+PERIODIC_KINDS: Final = frozenset({"heartbeat", "state", "intent", "vote_request"})
 """Kinds of which only the latest matters: it says all that the ones before said."""
 
 

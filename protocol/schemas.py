@@ -31,11 +31,16 @@ from protocol.messages import (
     GoalReply,
     Heartbeat,
     Intent,
+    LastHeard,
     MemberWay,
     Motion,
     Placement,
     Progress,
+    Reign,
     State,
+    Vote,
+    VoteRequest,
+    Warrant,
 )
 
 DIALECT: Final = "https://json-schema.org/draft/2020-12/schema"
@@ -47,6 +52,8 @@ SPEAKERS: Final = {
     "goal": ("an operator", "when a person wants; again until replied"),
     "goal_reply": ("tracked agent", "for each goal heard"),
     "deployment": ("the leader", "with every decision, and again while it holds"),
+    "vote_request": ("who stands for leader, and the leader", "eight times in a lease"),
+    "vote": ("every peer", "for each vote request heard"),
 }
 """Kind → who says it, how often."""
 
@@ -105,6 +112,20 @@ EXAMPLES: Final[tuple[AnyBody, ...]] = (
             connection="joined",
             joined=("base", "robot1"),
         ),
+    ),
+    VoteRequest(
+        epoch=3,
+        correlation="0.57",
+        warrant=Warrant(
+            lease_s=0.84, marks=(LastHeard(peer="base", mark="0.56"), LastHeard(peer="robot1", mark="1.203"))
+        ),
+    ),
+    Vote(
+        candidate="robot2",
+        correlation="0.57",
+        granted=True,
+        promise=Reign(epoch=3, leader="robot2", incarnation=0),
+        mark="1.204",
     ),
 )
 
@@ -181,6 +202,8 @@ def _speaker(body: Body) -> str:
             return "agent"
         case Deployment():
             return "base"
+        case VoteRequest():
+            return "robot2"
         case _:
             return "robot1"
 
@@ -215,7 +238,7 @@ def _page() -> str:
     ]
     parts = [
         f"### {part.__name__}\n\n{_plain(inspect.getdoc(part) or '')}\n\n{_field_table(part)}"
-        for part in (Authority, Progress, Motion, MemberWay, Placement)
+        for part in (Authority, Progress, Motion, MemberWay, Placement, Reign, Warrant, LastHeard)
     ]
     types: list[tuple[str, ...]] = [
         (f"`{name}`", f"`{json.dumps(msgspec.json.schema(getattr(messages, name)))}`".replace("|", "\\|"), meaning)
