@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from agents.base_station import BaseStation
 from agents.behaviour import begin
+from agents.certificate_judge import certificate_judge
 from agents.driver import DiscDriver
 from agents.mission import Mission
 from agents.robot import Robot
@@ -38,6 +39,7 @@ class Casting:
         self._environment = environment
         self._known_planner = planner
         self._spaces: list[CompiledMap] = []
+        self._judge = certificate_judge(mission, environment)
 
     def cast(self, name: str) -> tuple[Role, DiscDriver]:
         """Role and body of a peer.
@@ -56,7 +58,7 @@ class Casting:
                 role: Role = TrackedAgent(mission, space.free, space.geodesics, begin(mission, space.free))
             case "robot":
                 radius_m, speed_m_s = mission.robot_radius_m, mission.robot_speed_m_s
-                role = Robot(mission, name, self._space(radius_m, entry.start).geodesics)
+                role = Robot(mission, name, self._judge)
         room = self._space(max(radius_m - CLEARANCE_M, 0.0), entry.start).free
         return role, DiscDriver(entry.start, speed_m_s, room)
 

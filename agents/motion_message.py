@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from msgspec import structs
 
 from planning.continuation import assemble
 from planning.motion_plan import InvalidSchedule, Schedule, TimedPath
@@ -123,20 +122,6 @@ def end_stage(motion: Motion) -> int:
 def piece(way: MemberWay, stage: int) -> tuple[Point, ...]:
     """The waypoints of a stage, counted from the first one contained: one for a stop."""
     return way.waypoints[way.stages[stage] : way.stages[stage + 1] + 1]
-
-
-def trim(motion: Motion, first_stage: int) -> Motion:
-    """The same without the stages before ``first_stage``; at least one must be left.
-
-    An unscheduled member keeps its whole way.
-    """
-    gone = first_stage - motion.first_stage
-    ways = []
-    for way in motion.ways:
-        begin = way.stages[gone] if way.scheduled else 0
-        marks = [mark - begin for mark in way.stages[gone:]]
-        ways.append(structs.replace(way, waypoints=way.waypoints[begin:], stages=(0, *marks[1:])))
-    return structs.replace(motion, first_stage=first_stage, ways=tuple(ways))
 
 
 def _time(way: MemberWay) -> TimedPath:

@@ -61,7 +61,13 @@ _BASE_STATION, _ROBOT, _AGENT, _UNKNOWN = 0xF5B83DFF, 0x4DB8FFFF, 0xFF5D7EFF, 0x
 _ROLE_COLOURS = {"base_station": _BASE_STATION, "robot": _ROBOT, "tracked_agent": _AGENT}
 _WALL, _CELL, _SIGHT = 0xB9C2D0FF, 0x8A94A638, 0xC8D2E070
 _IN_SIGHT, _OUT_OF_SIGHT = 0x5BE08AFF, 0xFF4D4DFF
-_MODES = {"waiting": 0x7A8290FF, "moving": 0x4DB8FFFF, "arrived": 0x5BE08AFF, "holding": 0xF5B83DFF}
+_MODES = {
+    "waiting": 0x7A8290FF,
+    "moving": 0x4DB8FFFF,
+    "yielding": 0xB48CFFFF,
+    "arrived": 0x5BE08AFF,
+    "holding": 0xF5B83DFF,
+}
 _SERIES = {"connected": ["agent visible", "chain", "team"], "cost": ["cost", "lower bound"]}
 _LEVELS = {
     "debug": rr.TextLogLevel.DEBUG,

@@ -18,12 +18,13 @@ from agents.behaviour import Routine
 from agents.driver import patience_s
 from agents.mission import Mission, OnDemand
 from agents.path_follower import STANDING, Leg, PathFollower, Routes, Unreachable
-from agents.records import LogLine, Track
-from agents.rhythm import EARLY_S, Rhythm
+from agents.records import LogLine
+from agents.rhythm import EARLY_S
 from agents.role import Drive, Effect, Event, Heard, JobDone, Publish, Record, WakeAt, Woken
+from agents.self_report import SelfReport
 from planning.environment import Environment
 from protocol.bus import PeerAppeared, PeerVanished
-from protocol.messages import Goal, GoalReply, Heartbeat, Intent, Mode, Point
+from protocol.messages import Goal, GoalReply, Intent, Mode, Point
 
 REMEMBERED_GOALS: Final = 256
 """Answers kept, so that a goal that is said again is answered again and not walked again."""
@@ -65,8 +66,7 @@ class TrackedAgent:
 
     def start(self, now_s: float, position: Point) -> Sequence[Effect]:
         """Begin the two rhythms: control with intent, and heartbeat."""
-        self._control = Rhythm(1.0 / self._mission.control_hz, now_s)
-        self._heartbeat = Rhythm(1.0 / self._mission.heartbeat_hz, now_s)
+        self._report = SelfReport(self._mission, "tracked_agent", self._mission.agent_radius_m, now_s)
         return self._live(now_s, position)
 
     def handle(self, event: Event, now_s: float) -> Sequence[Effect]:
@@ -108,26 +108,14 @@ class TrackedAgent:
             self._rest(now_s)
         effects, self._logs = self._logs, []
         effects.append(Drive(self._leg.velocity, min(self._leg.lasts_s, self._patience_s)))
-        path, goal = self._follower.remaining(position), self._follower.target
-        if self._control.due(now_s):
-            effects.append(
-                Publish(Intent(position=position, velocity=self._leg.velocity, mode=self._mode, goal=goal, path=path))
-            )
-            effects.append(
-                Record(
-                    Track(
-                        role="tracked_agent",
-                        position=position,
-                        velocity=self._leg.velocity,
-                        radius_m=self._mission.agent_radius_m,
-                        mode=self._mode,
-                        target=goal,
-                        path=path,
-                    )
-                )
-            )
-        if self._heartbeat.due(now_s):
-            effects.append(Publish(Heartbeat(role="tracked_agent", mode=self._mode)))
+        intent = Intent(
+            position=position,
+            velocity=self._leg.velocity,
+            mode=self._mode,
+            goal=self._follower.target,
+            path=self._follower.remaining(position),
+        )
+        effects += self._report.due(now_s, intent)
         effects.append(WakeAt(self._next_wake_s(now_s)))
         return effects
 
@@ -160,7 +148,7 @@ class TrackedAgent:
             self._routine.reached()
 
     def _next_wake_s(self, now_s: float) -> float:
-        wake_s = min(self._control.next_s, self._heartbeat.next_s)
+        wake_s = self._report.next_s
         if self._mode == "moving":
             return min(wake_s, now_s + self._leg.lasts_s)
         return min(wake_s, max(self._idle_until_s, now_s))

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec import structs
 
-from agents.motion_message import InvalidMotion, end_stage, piece, to_motion, to_schedule, trim
+from agents.motion_message import InvalidMotion, end_stage, to_motion, to_schedule
 from planning.continuation import assemble
 from planning.motion_plan import Schedule, TimedPath
 from protocol.messages import MemberWay, Motion, Point
@@ -52,21 +52,6 @@ def test_a_schedule_comes_back(schedule: Schedule) -> None:
     times_s = np.linspace(0.0, schedule.end_s, 50)
     np.testing.assert_allclose(back.positions(times_s), schedule.positions(times_s), atol=1e-9)
     assert message(back) == motion
-
-
-@given(schedules(), st.data())
-def test_a_trimmed_message_holds_the_same_stages(schedule: Schedule, data: st.DataObject) -> None:
-    motion = message(schedule, first_stage=7)
-    first = data.draw(st.integers(7, end_stage(motion) - 1))
-    rest = trim(motion, first)
-    assert (rest.first_stage, end_stage(rest)) == (first, end_stage(motion))
-    to_schedule(rest)
-    for way, shorter in zip(motion.ways, rest.ways, strict=True):
-        if way.scheduled:
-            for stage in range(first, end_stage(motion)):
-                assert piece(shorter, stage - first) == piece(way, stage - 7)
-        else:
-            assert shorter.waypoints == way.waypoints
 
 
 def way(member: str, *waypoints: Point, stages: tuple[int, ...], speed_m_s: float = 1.0) -> MemberWay:

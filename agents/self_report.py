@@ -1,0 +1,51 @@
+"""What a peer that moves tells of itself: to the others, and into the recording."""
+
+from __future__ import annotations
+
+from agents.mission import Mission
+from agents.records import Track
+from agents.rhythm import Rhythm
+from agents.role import Effect, Publish, Record
+from protocol.messages import Heartbeat, Intent, RoleName, State
+
+
+class SelfReport:
+    """Two rhythms: where the body is, at ``control_hz``, and that the mind is alive, at ``heartbeat_hz``.
+
+    Args:
+        mission: the rates.
+        role: of the peer.
+        radius_m: of its body.
+        now_s: when both begin.
+    """
+
+    def __init__(self, mission: Mission, role: RoleName, radius_m: float, now_s: float) -> None:
+        self._role, self._radius_m = role, radius_m
+        self._control = Rhythm(1.0 / mission.control_hz, now_s)
+        self._heartbeat = Rhythm(1.0 / mission.heartbeat_hz, now_s)
+
+    @property
+    def next_s(self) -> float:
+        """When something is due next."""
+        return min(self._control.next_s, self._heartbeat.next_s)
+
+    def due(self, now_s: float, body: State | Intent, *, urgent: bool = False) -> list[Effect]:
+        """What is to be said and recorded now; ``body`` is said, but not recorded, before its time if it is urgent."""
+        effects: list[Effect] = []
+        due = self._control.due(now_s)
+        if due or urgent:
+            effects.append(Publish(body))
+        if due:
+            track = Track(
+                role=self._role,
+                position=body.position,
+                velocity=body.velocity,
+                radius_m=self._radius_m,
+                mode=body.mode,
+                target=body.target if isinstance(body, State) else body.goal,
+                path=body.path,
+            )
+            effects.append(Record(track))
+        if self._heartbeat.due(now_s):
+            effects.append(Publish(Heartbeat(role=self._role, mode=body.mode)))
+        return effects
