@@ -1,0 +1,321 @@
+"""A* in the coordination diagram of a team, on the grid of its limits, along straight lines.
+
+From a grid point any set of robots may go on to their next limits together, or one may go back to its last. The moves
+of single robots alone reach whatever can be reached on the grid; those together save time. But the pieces of a grid are
+of all lengths, and robots that cross one piece each at a time wait for each other at every limit. So this is Theta*: A*
+that tries, for every point that it comes to, the straight line in the diagram from the point where it last turned, on
+which all robots go evenly, and takes that where it is free.
+
+The cost of a line is the time of the robot that takes longest. The heuristic is the time that the slowest needs for
+what is left of its path: never more than it takes, so what costs no more than that at the start is the best there is.
+Else the schedule found need not be the fastest, for Theta* looks at lines between some grid points only. It is complete
+as A* is: if the search ends without a way, there is none on the grid.
+
+Thesis §4.3.3, where cost and heuristic are Euclidean in the diagram; a team is as late as its last, so here it is time.
+Theta*: Daniel, Nash, Koenig and Felner, https://doi.org/10.1613/jair.2994.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from heapq import heappop, heappush
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from planning.coordination_diagram import CoordinationDiagram
+from planning.kernel import kernel
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+_FOUND: Final = 0
+_EXHAUSTED: Final = 1
+_GAVE_UP: Final = 2
+
+_SAME: Final = 1e-6
+"""Of the time that the slowest needs at least: costs nearer to each other than this are equal, and the point that is
+nearer to the goal goes first."""
+
+_AT_ONCE: Final = 1e-12
+"""Of a line: robots that reach limits so shortly after each other reach them together."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Route:
+    """What a search found: a way of straight lines through the diagram.
+
+    Attributes:
+        turns: (n, k) int: the limit of each robot at each of n ≥ 1 turns, the first at the start.
+        complete: whether it leads to the goal; else it leads to the point looked at that has least left to go, all
+            robots together.
+        exhausted: whether the search saw all that can be reached, so that no way leads to the goal if none was found.
+    """
+
+    turns: Ints
+    complete: bool
+    exhausted: bool
+
+
+def search_diagram(diagram: CoordinationDiagram, speeds_m_s: ArrayLike, most_nodes: int) -> Route:
+    """A way from the start of all paths to the end of all.
+
+    Args:
+        diagram: of k robots; the start must be allowed.
+        speeds_m_s: (k,) float, above 0: of each robot.
+        most_nodes: the search is given up after this many successors, whether they were known or not.
+
+    Complexity: O(2^k k²) for each grid point looked at, of which there can be as many as the product of the numbers of
+    limits; lines between turns as long as a path cost O(k² n).
+    """
+    k = len(diagram)
+    limits = np.concatenate(diagram.limits_m)
+    firsts = np.cumsum([0, *map(len, diagram.limits_m)], dtype=np.int64)
+    starts = np.zeros((k, k), dtype=np.int64)
+    blocked, seen = [np.zeros(0, dtype=np.bool_)], [np.zeros(0, dtype=np.bool_)]
+    total = 0
+    for pair, table in diagram.blocked.items():
+        starts[pair] = total
+        total += table.size
+        blocked.append(table.ravel())
+        seen.append(diagram.seen[pair].ravel() if diagram.joined else blocked[0])
+    joined = np.zeros(k, dtype=np.bool_)
+    joined[list(diagram.joined)] = True
+    status, turns = _search(
+        limits,
+        firsts,
+        1.0 / np.array(speeds_m_s, dtype=np.float64),
+        starts,
+        np.concatenate(blocked),
+        np.concatenate(seen),
+        joined,
+        most_nodes,
+    )
+    return Route(turns, status == _FOUND, status == _EXHAUSTED)
+
+
+@kernel
+def _admits(elements: Ints, sizes: Ints, starts: Ints, blocked: Bools, seen: Bools, joined: Bools, part: Ints) -> bool:
+    """Whether robots may be in these elements (k,) together; ``part`` (k,) is scratch."""
+    k = elements.shape[0]
+    for i in range(k):
+        for j in range(i + 1, k):
+            if blocked[starts[i, j] + elements[i] * sizes[j] + elements[j]]:
+                return False
+    if seen.shape[0] == 0:
+        return True
+    for i in range(k):
+        part[i] = i
+    for i in range(k):
+        for j in range(i + 1, k):
+            if part[i] != part[j] and seen[starts[i, j] + elements[i] * sizes[j] + elements[j]]:
+                mine, other = part[i], part[j]
+                for m in range(k):
+                    if part[m] == other:
+                        part[m] = mine
+    first = -1
+    for i in range(k):
+        if joined[i]:
+            if first >= 0 and part[i] != first:
+                return False
+            first = part[i]
+    return True
+
+
+@kernel
+def _line_is_free(
+    a: Ints, b: Ints, limits: Floats, firsts: Ints, sizes: Ints, starts: Ints, blocked: Bools, seen: Bools,
+    joined: Bools, elements: Ints, part: Ints,
+) -> bool:  # fmt: skip
+    """Whether all robots may go evenly from their limits ``a`` (k,) to ``b``; the last two are scratch.
+
+    Between two limits that any robot crosses the elements stay the same. At a limit itself they border those before
+    and after it, and are allowed as these are.
+    """
+    k = a.shape[0]
+    way = np.sign(b - a)
+    for i in range(k):
+        elements[i] = 2 * a[i] + way[i]
+    while True:
+        if not _admits(elements, sizes, starts, blocked, seen, joined, part):
+            return False
+        # The share of the line after which the next robots reach a limit; those of one share do at once.
+        following = 1.0
+        for i in range(k):
+            if way[i] != 0:
+                following = min(following, _share(i, a[i], b[i], elements[i] + way[i], limits, firsts))
+        if following >= 1.0 - _AT_ONCE:
+            return True
+        for i in range(k):
+            if way[i] != 0 and _share(i, a[i], b[i], elements[i] + way[i], limits, firsts) <= following + _AT_ONCE:
+                elements[i] += 2 * way[i]
+
+
+@kernel
+def _share(i: int, start: int, end: int, element: int, limits: Floats, firsts: Ints) -> float:
+    """How far the limit that an even element stands for is on robot i's way from one limit to another, 0 to 1."""
+    first = limits[firsts[i] + start]
+    return float((limits[firsts[i] + element // 2] - first) / (limits[firsts[i] + end] - first))
+
+
+@kernel
+def _span(a: Ints, b: Ints, limits: Floats, firsts: Ints, pace: Floats) -> float:
+    """Seconds that the slowest robot takes from its limit in ``a`` (k,) to that in ``b``."""
+    longest = 0.0
+    for i in range(a.shape[0]):
+        longest = max(longest, abs(limits[firsts[i] + b[i]] - limits[firsts[i] + a[i]]) * pace[i])
+    return longest
+
+
+@kernel
+def _measure_left(a: Ints, limits: Floats, firsts: Ints, pace: Floats) -> float:
+    """Seconds that all robots together have left from their limits in ``a`` (k,)."""
+    total = 0.0
+    for i in range(a.shape[0]):
+        total += (limits[firsts[i + 1] - 1] - limits[firsts[i] + a[i]]) * pace[i]
+    return total
+
+
+@kernel
+def _find_slot(at: Ints, points: Ints, slots: Ints) -> int:
+    """Where a grid point (k,) is in a hash table of rows of ``points``, or the empty slot (−1) where it belongs."""
+    code = 1469598103934665603
+    for i in range(at.shape[0]):
+        code = (code ^ at[i]) * 1099511628211
+    slot = (code ^ (code >> 29)) & (slots.shape[0] - 1)
+    while slots[slot] >= 0:
+        row = points[slots[slot]]
+        same = True
+        for i in range(at.shape[0]):
+            same = same and row[i] == at[i]
+        if same:
+            break
+        slot = (slot + 1) & (slots.shape[0] - 1)
+    return int(slot)
+
+
+@kernel
+def _double(points: Ints, known: int) -> tuple[Ints, Ints]:
+    """Room for twice as many points, and their hash table."""
+    larger = np.zeros((2 * points.shape[0], points.shape[1]), np.int64)
+    larger[:known] = points[:known]
+    slots = np.full(4 * larger.shape[0], -1)
+    for point in range(known):
+        slots[_find_slot(larger[point], larger, slots)] = point
+    return larger, slots
+
+
+@kernel
+def _move(move: int, at: Ints, last: Ints, following: Ints, elements: Ints) -> bool:
+    """Write where a move leads from ``at`` (k,), and the elements on the way; whether there is such a move.
+
+    Moves below 2^m are the subsets of the m robots that are not at their last limits, who go on; those above are single
+    robots that go back.
+    """
+    going = 0
+    for i in range(at.shape[0]):
+        following[i], elements[i] = at[i], 2 * at[i]
+        if at[i] < last[i]:
+            if (move >> going) & 1:
+                following[i], elements[i] = at[i] + 1, 2 * at[i] + 1
+            going += 1
+    if move < 1 << going:
+        return True
+    back = move - (1 << going)
+    for i in range(at.shape[0]):
+        following[i], elements[i] = at[i], 2 * at[i]
+    following[back], elements[back] = at[back] - 1, 2 * at[back] - 1
+    return bool(at[back] > 0)
+
+
+@kernel
+def _search(
+    limits: Floats, firsts: Ints, pace: Floats, starts: Ints, blocked: Bools, seen: Bools, joined: Bools, most: int
+) -> tuple[int, Ints]:
+    """`search_diagram`: how it ended, and the turns (n, k).
+
+    Args:
+        limits: (l,) of all robots, one after the other, metres.
+        firsts: (k + 1,) where those of each begin.
+        pace: (k,) seconds a metre.
+        starts: (k, k), for i < j, where the table of a pair begins in ``blocked`` and ``seen`` (t,).
+        blocked: see `CoordinationDiagram`.
+        seen: empty if nobody is to be joined.
+        joined: (k,) who is.
+        most: successors.
+    """
+    k = pace.shape[0]
+    last = firsts[1:] - firsts[:-1] - 1
+    sizes = 2 * last + 1
+    following, elements, on_line, part = (
+        np.empty(k, np.int64), np.empty(k, np.int64), np.empty(k, np.int64), np.empty(k, np.int64)
+    )  # fmt: skip
+    points = np.zeros((256, k), np.int64)
+    points, slots = _double(points, 1)
+    costs, turned_at, done = np.zeros(len(points)), np.zeros(len(points), np.int64), np.zeros(len(points), np.bool_)
+    known, successors = 1, 0
+    unit = _SAME * _span(points[0], last, limits, firsts, pace) + 1e-300
+    nearest, least_left = 0, _measure_left(points[0], limits, firsts, pace)
+    waiting = [(0, least_left, 0)]
+    status = _EXHAUSTED
+    while len(waiting) > 0:
+        _, left, point = heappop(waiting)
+        if done[point]:
+            continue
+        done[point] = True
+        if left < least_left:
+            nearest, least_left = point, left
+        if np.all(points[point] == last):
+            nearest, status = point, _FOUND
+            break
+        if successors > most:
+            status = _GAVE_UP
+            break
+        for move in range(1, (1 << np.sum(points[point] < last)) + k):
+            successors += 1
+            if successors > most:
+                break
+            if not _move(move, points[point], last, following, elements):
+                continue
+            slot = _find_slot(following, points, slots)
+            target = slots[slot]
+            if target >= 0 and done[target]:
+                continue
+            if not _admits(elements, sizes, starts, blocked, seen, joined, part):
+                continue
+            if target < 0:
+                if known == len(points):
+                    points, slots = _double(points, known)
+                    slot = _find_slot(following, points, slots)
+                    costs = np.concatenate((costs, np.zeros(known)))
+                    turned_at = np.concatenate((turned_at, np.zeros(known, np.int64)))
+                    done = np.concatenate((done, np.zeros(known, np.bool_)))
+                target = known
+                known += 1
+                slots[slot] = target
+                points[target] = following
+                costs[target] = np.inf
+            turn = turned_at[point]
+            cost = costs[turn] + _span(points[turn], following, limits, firsts, pace)
+            if cost < costs[target] and not _line_is_free(
+                points[turn], following, limits, firsts, sizes, starts, blocked, seen, joined, on_line, part
+            ):
+                turn = point
+                cost = costs[point] + _span(points[point], following, limits, firsts, pace)
+            if cost < costs[target]:
+                costs[target], turned_at[target] = cost, turn
+                expected = cost + _span(following, last, limits, firsts, pace)
+                heappush(waiting, (int(expected / unit), _measure_left(following, limits, firsts, pace), target))
+    turns = 1
+    point = nearest
+    while point != 0:
+        turns += 1
+        point = turned_at[point]
+    route = np.zeros((turns, k), np.int64)
+    point = nearest
+    for turn in range(turns - 1, 0, -1):
+        route[turn] = points[point]
+        point = turned_at[point]
+    return status, route
