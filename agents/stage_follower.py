@@ -102,14 +102,19 @@ class StageFollower:
             check(motion)
         except InvalidMotion as problem:
             return str(problem)
-        if self._motion is None or (epoch, motion.plan) != self._plan:
-            objection, stage, passed = self._object_to_plan(epoch, motion), 0, 0
-        else:
-            objection, stage, passed = self._object_to_revision(self._motion, motion), self._finished, self._passed
-        if objection:
-            return objection
         way = next(way for way in motion.ways if way.member == self._name)
-        off_m = _distance_off(way, stage - motion.first_stage, passed, position)
+        if self._motion is None or (epoch, motion.plan) != self._plan:
+            if objection := self._object_to_plan(epoch, motion):
+                return objection
+            off_m = math.dist(position, way.waypoints[0])
+        else:
+            if objection := self._object_to_revision(self._motion, motion):
+                return objection
+            stage = self._finished - motion.first_stage
+            if self._finished <= self._released:
+                off_m = _distance_off(way, stage, self._passed, position)
+            else:
+                off_m = math.dist(position, way.waypoints[way.stages[stage]])
         return f"it has {self._name} {off_m:.2f} m from where it is" if off_m > ASTRAY_M else ""
 
     def accept(self, epoch: int, motion: Motion) -> None:
