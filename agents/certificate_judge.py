@@ -62,13 +62,14 @@ def _find_fault(mission: Mission, way: MemberWay) -> str:
         return f"{way.member} is not on the roster"
     if entry.role == "tracked_agent":
         return f"{way.member} waits for nobody, and is scheduled" if way.scheduled else ""
+    if entry.role == "base_station":  # a post that takes no room, whatever it looks like
+        if any(place != entry.start for place in way.waypoints):
+            return f"{way.member} is not where it stands, at ({entry.start[0]:g}, {entry.start[1]:g})"
+        return ""
     if way.radius_m < mission.robot_radius_m:
         return (
             f"{way.member} has a radius of {way.radius_m:g} m, and not {mission.robot_radius_m:g} m as in the mission"
         )
-    if entry.role == "base_station":
-        if any(place != entry.start for place in way.waypoints):
-            return f"{way.member} is not where it stands, at ({entry.start[0]:g}, {entry.start[1]:g})"
-    elif way.speed_m_s > mission.robot_speed_m_s:
+    if way.speed_m_s > mission.robot_speed_m_s:
         return f"{way.member} is to go {way.speed_m_s:g} m/s, and can go {mission.robot_speed_m_s:g} m/s"
     return ""
