@@ -34,6 +34,7 @@ if TYPE_CHECKING:
         geodesic_weights,
     )
     from planning.placement_graph import PlacementGraph
+    from planning.reach_in_sight import time_in_sight
     from planning.redeployment import Redeployment, redeploy
     from planning.relays import MostRelays, RelayTree, fewest_relays, most_relays
     from planning.schedule import schedule
@@ -82,6 +83,7 @@ __all__ = [
     "schedule",
     "shortest_path_deployment",
     "steiner_tree",
+    "time_in_sight",
     "virtual_weights",
 ]
 
@@ -126,6 +128,7 @@ _HOMES = {
     "schedule": "planning.schedule",
     "shortest_path_deployment": "planning.deployment",
     "steiner_tree": "planning.steiner",
+    "time_in_sight": "planning.reach_in_sight",
     "virtual_weights": "planning.edge_weights",
 }
 

@@ -22,6 +22,7 @@ def exercise() -> None:
     from planning.ordered_chain import search_in_order
     from planning.placement import reachable_positions
     from planning.placement_graph import PlacementGraph
+    from planning.reach_in_sight import time_in_sight
     from planning.redeployment import redeploy
     from planning.schedule import schedule
     from planning.shortest_paths import all_pairs, from_source
@@ -53,6 +54,7 @@ def exercise() -> None:
     certify(two, rooms)
     schedule([points[2:3], [(8.0, 4.0), (1.0, 4.0)], [(10.0, 4.0), (17.0, 4.0)]], 0.2, rooms)
     certify(Schedule(two.members, two.paths, 0.2, stages=[(0, 1), (0, 0)]), rooms, links=[("a", "b")], ends=("a", "b"))
+    time_in_sight(rooms, points[:2], points[2], 1.0, 0.5)
     graph = PlacementGraph.from_points(rooms, 0.2, 2.0)
     graph.distances_from(points[0])
     _ = graph.distances
