@@ -249,7 +249,7 @@ class VoteRequest(Body, frozen=True, kw_only=True, tag="vote_request"):
     warrant: Warrant | None = None
     """Of a leader in office; none while it only stands."""
     withdrawn: bool = False
-    """It no longer stands and will never lead in this epoch: promises made for it are void. No answer is wanted."""
+    """It has not won, and will not lead in this epoch or one before: promises of these are void. Wants no answer."""
 
 
 class Vote(Body, frozen=True, kw_only=True, tag="vote"):
@@ -260,7 +260,7 @@ class Vote(Body, frozen=True, kw_only=True, tag="vote"):
     granted: bool
     """Whether nobody else will be promised a lease from now on for as long as one lasts."""
     promise: Reign | None = None
-    """The last one made; kept on disk before it is said."""
+    """The last one made; it is on disk. Of a peer that has no vote: whom it obeyed last."""
     mark: Correlation
     """Chosen by the voter, another one each time that time has passed; comes back in warrants."""
 
