@@ -5,9 +5,9 @@ random place, or to one that it sees, and the team is redeployed: metres driven 
 trees (thesis eq. 42). The next redeployment sets out from there; after some of them a new walk begins with a new base.
 All k members are in the tree; those that are not needed stand where they cost least.
 
-A cell says where a member may stand and not where it does: several may share one. Who stays in its cell stays where it
-is; others take the cell's own position, or the nearest place in the cell that is free. Wherever in their cells they
-are, linked members see each other.
+Several members may share a placement. Who stays in its placement stays where it is; others take the placement's own
+position, or the nearest place beside it that is free: in the same cell, from where linked members see each other
+whatever the place; beside a point, where they do.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class MotionTask:
 
 
 class Rooms:
-    """Where members can stand in the placements of a graph: in cells at several places, on points at one.
+    """Where members can stand in the placements of a graph: at their positions, and beside them.
 
     Args:
         graph: the placements.
@@ -82,24 +82,22 @@ class Rooms:
         self._around = around[np.argsort(np.hypot(*around.T), kind="stable")]
         self._places: dict[int, Floats] = {}
 
-    def find(self, placement: int, taken: Sequence[Floats]) -> Floats | None:
-        """A place (2,), metres, in a placement, away from all that are taken; None if there is none."""
+    def find(self, placement: int, taken: Sequence[Floats]) -> Iterator[Floats]:
+        """Places (2,), metres, in a placement, away from all that are taken, the nearest to its position first."""
         if placement not in self._places:
             self._places[placement] = self._look_around(placement)
         for place in self._places[placement]:
             if all(np.hypot(*(place - other)) >= APART_M for other in taken):
-                return np.asarray(place)
-        return None
+                yield place
 
     def _look_around(self, placement: int) -> Floats:
-        """The placement's own position, then others in its cell."""
-        places = self._graph.positions[placement] + self._around
-        if self._graph.kind == "points":
-            return places[:1]
-        cell = shapely.Polygon(self._graph.outlines[self._graph.cells[placement]])
+        """The placement's own position, then others beside it: (n, 2)."""
+        places: Floats = self._graph.positions[placement] + self._around
         points = shapely.points(places)
-        inside = shapely.covers(cell, points) & shapely.covers(self._free, points)
-        inside[0] = True  # which may lie on the border of both
+        inside = np.asarray(shapely.covers(self._free, points))
+        if self._graph.kind == "cells":
+            inside &= shapely.covers(shapely.Polygon(self._graph.outlines[self._graph.cells[placement]]), points)
+        inside[0] = True  # which may lie on the border
         return places[inside]
 
 
@@ -183,7 +181,17 @@ def _settle(
         ]
     for node, cell in enumerate(found.cells.tolist()):
         if places[node] is None:
-            places[node] = rooms.find(cell, [place for place in places if place is not None])
+            partners = found.tree[(found.tree == node).any(axis=1)].sum(axis=1) - node
+            seen = [place for place in (places[partner] for partner in partners) if place is not None]
+            free = rooms.find(cell, [place for place in places if place is not None])
+            places[node] = next((place for place in free if _sees_all(graph, place, seen)), None)
             if places[node] is None:
                 return None
-    return _Standing(found.cells, np.array(places), found.tree)
+    chosen = np.array(places)
+    if not all(_sees_all(graph, chosen[u], [chosen[v]]) for u, v in found.tree):
+        return None  # two that stay beside their points
+    return _Standing(found.cells, chosen, found.tree)
+
+
+def _sees_all(graph: PlacementGraph, place: Floats, others: Sequence[Floats]) -> bool:
+    return all(graph.environment.line_of_sight(tuple(place), tuple(other)) for other in others)
