@@ -26,6 +26,9 @@ Ints = NDArray[np.int64]
 _TRY: Final = 20
 """Where it is known that the end cannot be reached, this part of the effort goes into how far one gets."""
 
+_HASTE: Final = 1.0
+"""Of a second search, where one for the earliest end is given up."""
+
 _WRONG: Final = {
     "collision": "are in each other's way",
     "link": "would have to part",
@@ -77,9 +80,12 @@ def schedule_in(diagram: CoordinationDiagram, team: Team, most_nodes: int) -> Sc
         wrong = text, (one, other)
     if wrong is not None:
         text, between = wrong
-        route = search_diagram(reachable, team.speeds_m_s, most_nodes // _TRY)
+        route = search_diagram(reachable, team.speeds_m_s, most_nodes // _TRY, _HASTE)
         raise NoSchedule(text, _execute(diagram, team, route.turns), between, proven=True)
-    route = search_diagram(reachable, team.speeds_m_s, most_nodes)
+    for haste in (0.0, _HASTE):
+        route = search_diagram(reachable, team.speeds_m_s, most_nodes, haste)
+        if route.complete or route.exhausted:
+            break
     found = _execute(diagram, team, route.turns)
     if route.complete:
         return found

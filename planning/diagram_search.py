@@ -59,13 +59,15 @@ class Route:
     exhausted: bool
 
 
-def search_diagram(diagram: CoordinationDiagram, speeds_m_s: ArrayLike, most_nodes: int) -> Route:
+def search_diagram(diagram: CoordinationDiagram, speeds_m_s: ArrayLike, most_nodes: int, haste: float = 0.0) -> Route:
     """A way from the start of all paths to the end of all.
 
     Args:
         diagram: of k robots; the start must be allowed.
         speeds_m_s: (k,) float, above 0: of each robot.
         most_nodes: the search is given up after this many successors, whether they were known or not.
+        haste: how much of the time that robots have left on average, if none waits, is added to the heuristic. With
+            more than 0 far fewer points are looked at where robots have to wait, and the way may take longer.
 
     Complexity: O(2^k k²) for each grid point looked at, of which there can be as many as the product of the numbers of
     limits; lines between turns as long as a path cost O(k² n).
@@ -92,6 +94,7 @@ def search_diagram(diagram: CoordinationDiagram, speeds_m_s: ArrayLike, most_nod
         np.concatenate(seen),
         joined,
         most_nodes,
+        haste / k,
     )
     return Route(turns, status == _FOUND, status == _EXHAUSTED)
 
@@ -232,8 +235,9 @@ def _move(move: int, at: Ints, last: Ints, following: Ints, elements: Ints) -> b
 
 @kernel
 def _search(
-    limits: Floats, firsts: Ints, pace: Floats, starts: Ints, blocked: Bools, seen: Bools, joined: Bools, most: int
-) -> tuple[int, Ints]:
+    limits: Floats, firsts: Ints, pace: Floats, starts: Ints, blocked: Bools, seen: Bools, joined: Bools, most: int,
+    haste: float,
+) -> tuple[int, Ints]:  # fmt: skip
     """`search_diagram`: how it ended, and the turns (n, k).
 
     Args:
@@ -245,6 +249,7 @@ def _search(
         seen: empty if nobody is to be joined.
         joined: (k,) who is.
         most: successors.
+        haste: part of the time that all robots have left that is added to the heuristic.
     """
     k = pace.shape[0]
     last = firsts[1:] - firsts[:-1] - 1
@@ -306,8 +311,9 @@ def _search(
                 cost = costs[point] + _span(points[point], following, limits, firsts, pace)
             if cost < costs[target]:
                 costs[target], turned_at[target] = cost, turn
-                expected = cost + _span(following, last, limits, firsts, pace)
-                heappush(waiting, (int(expected / unit), _measure_left(following, limits, firsts, pace), target))
+                left = _measure_left(following, limits, firsts, pace)
+                expected = cost + _span(following, last, limits, firsts, pace) + haste * left
+                heappush(waiting, (int(expected / unit), left, target))
     turns = 1
     point = nearest
     while point != 0:
