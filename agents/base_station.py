@@ -1,22 +1,24 @@
 """The base station: the fixed end of the chain, and in this version the leader.
 
-It hears where robots and agent are, has deployments planned beside its control loop, and publishes them. A *decision*
-is a choice of links and relay places. While one stands it is repeated, with a rising authority sequence and the spares'
-places brought up to date; the decision's number rises only when links or relay places change.
+It hears where robots and agent are, has deployments and motions planned beside its control loop, and publishes them. A
+*decision* is a choice of links and relay places. While one stands it is repeated, with a rising authority sequence, the
+spares' places brought up to date, and as much of the motion released as is due (:mod:`agents.dispatcher`); the
+decision's number rises only when links or relay places change.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
 from typing import TYPE_CHECKING, Final, Literal, Protocol
 
 from msgspec import structs
 
+from agents.dispatcher import Dispatcher
 from agents.mission import Mission
-from agents.records import Connectivity, Decision, LogLine, Planned, Track
+from agents.network import judge_network
+from agents.records import Decision, LogLine, Ordered, Planned, Track
 from agents.rhythm import EARLY_S, Rhythm
 from agents.role import (
     Compute,
@@ -29,7 +31,7 @@ from agents.role import (
     WakeAt,
     Woken,
 )
-from planning.connectivity import algebraic_connectivity, component_labels
+from agents.team_planner import Answer, Question
 from planning.environment import Environment
 from protocol.bus import PeerAppeared, PeerVanished
 from protocol.messages import AnyBody, Authority, Deployment, Heartbeat, Intent, Mode, Placement, Point, State
@@ -43,6 +45,12 @@ GRACE_S: Final = 1.5
 REPETITIONS: Final = 4
 """A deployment is said so often within its validity: a robot holds only when all of these are lost."""
 
+AGAIN_S: Final = 0.2
+"""A deployment is said again after this while robots have not answered it."""
+
+PACE_S: Final = 0.04
+"""Deployments are at least so far apart, however much there is to release."""
+
 PLANNING: Final = "planning"
 """Name of the planning job."""
 
@@ -53,12 +61,10 @@ def silence_s(control_hz: float) -> float:
 
 
 class Planner(Protocol):
-    """What is used of :class:`agents.leader.DeploymentPlanner`. Pure, so that it can run beside the control loop."""
+    """What is used of :class:`agents.team_planner.TeamPlanner`. Pure, so that it can run beside the control loop."""
 
-    def plan(
-        self, agent: Point, agent_path: Sequence[Point], robots: Mapping[str, Point], previous: Plan | None
-    ) -> Plan:
-        """Who is to stand where, now that agent and robots are there."""
+    def plan(self, question: Question) -> Answer:
+        """Who is to stand where, and how they get there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +84,7 @@ class BaseStation:
     Args:
         mission: roster, rates and periods.
         environment: the map as drawn, for the true lines of sight between the places heard.
-        planner: decides on deployments.
+        planner: decides on deployments and motions.
     """
 
     hears = frozenset({"state", "intent"})
@@ -93,22 +99,27 @@ class BaseStation:
         self._robots = tuple(robot.name for robot in mission.robots)
         self._silent_s = silence_s(mission.control_hz)
         self._known: dict[str, Known] = {}
-        self._epoch = self._sequence = self._decisions = 0
+        self._sequence = 0
         self._plan: Plan | None = None
-        self._said: Deployment | None = None
+        self._orders: Deployment | None = None
+        """What was said last."""
+        self._said_s = -math.inf
         self._planning = self._urgent = False
-        self._failure = ""
-        """Of planning; said once, however often it happens."""
+        self._complaints: dict[str, str] = {}
+        """What was wrong last, by what it was about; said once, however often it happens."""
         self._effects: list[Effect] = []
 
     def start(self, now_s: float, position: Point) -> Sequence[Effect]:
         """Begin the rhythms: control with state, heartbeat, planning."""
-        self._epoch = max(0, round(1000.0 * now_s))
+        epoch = max(0, round(1000.0 * now_s))
+        starts = {robot.name: robot.start for robot in self._mission.robots}
+        self._dispatcher = Dispatcher(self._name, self._position, starts, epoch)
+        self._authority = Authority(epoch=epoch, leader=self._name, sequence=0)
         self._grace_until_s = now_s + GRACE_S
         self._control = Rhythm(1.0 / self._mission.control_hz, now_s)
         self._heartbeat = Rhythm(1.0 / self._mission.heartbeat_hz, now_s)
         self._replanning = Rhythm(self._mission.planning_period_s, now_s)
-        self._repeat_at_s = math.inf
+        self._say_at_s = math.inf
         return self.handle(Woken(position), now_s)
 
     def handle(self, event: Event, now_s: float) -> Sequence[Effect]:
@@ -119,12 +130,12 @@ class BaseStation:
             case Heard(_, envelope):
                 self._listen(envelope.sender, envelope.body, now_s)
             case PeerVanished(peer):
-                self._lose(peer, "its process has ended or cannot be reached")
+                self._lose(peer, "its process has ended or cannot be reached", now_s)
             case JobDone(job=name) if name == PLANNING:
                 self._planned(event, now_s)
             case JobDone() | PeerAppeared():
                 pass
-        if not isinstance(event, Woken) and not self._urgent and not self._effects:
+        if not isinstance(event, Woken) and not self._urgent and not self._effects and now_s < self._say_at_s - EARLY_S:
             return ()
         self._live(now_s)
         effects, self._effects = self._effects, []
@@ -143,131 +154,165 @@ class BaseStation:
             self._urgent = True
         elif isinstance(body, Intent) and isinstance(before.body, Intent) and body.goal != before.body.goal:
             self._urgent = True
+        if isinstance(body, State):
+            self._dispatcher.hear(peer, body, now_s)
+            self._heed(now_s)
 
-    def _lose(self, peer: str, why: str) -> None:
+    def _lose(self, peer: str, why: str, now_s: float) -> None:
         if self._known.pop(peer, None) is not None:
             self._log("warning", f"has lost {peer}: {why}")
             self._urgent = True
+            if peer in self._robots:
+                self._dispatcher.lose(peer)
+                self._heed(now_s)
 
     def _live(self, now_s: float) -> None:
         """Do what is due and ask to be woken for the next of it."""
         for peer in [peer for peer, known in self._known.items() if now_s - known.heard_s > self._silent_s]:
-            self._lose(peer, f"silent for {self._silent_s:g} s")
+            self._lose(peer, f"silent for {self._silent_s:g} s", now_s)
         self._plan_if_due(now_s)
-        if self._said is not None and now_s >= self._repeat_at_s - EARLY_S:
-            self._say(structs.replace(self._said, authority=self._next_authority()), now_s)
+        if now_s >= self._say_at_s - EARLY_S:
+            self._say(now_s)
         if self._control.due(now_s):
             self._report()
         if self._heartbeat.due(now_s):
             self._effects.append(Publish(Heartbeat(role="base_station", mode=self._mode)))
-        wake_s = min(self._control.next_s, self._heartbeat.next_s, self._replanning.next_s, self._repeat_at_s)
+        wake_s = min(self._control.next_s, self._heartbeat.next_s, self._replanning.next_s, self._say_at_s)
         self._effects.append(WakeAt(wake_s))
+
+    def _heed(self, now_s: float) -> None:
+        """See to what the dispatcher has come to, after it was told something."""
+        for text in self._dispatcher.reports:
+            self._log("warning", text)
+            self._urgent = True
+        self._dispatcher.reports.clear()
+        if not self._planning:  # what is planned begins where the robots may go now
+            self._dispatcher.release()
+        if self._dispatcher.news:
+            self._say_at_s = min(self._say_at_s, max(now_s, self._said_s + PACE_S))
 
     def _plan_if_due(self, now_s: float) -> None:
         """Ask for a plan, one at a time, as soon as the agent and enough of the team are known."""
         due = self._replanning.due(now_s) or self._urgent
         agent = self._known.get(self._agent)
-        robots = {name: self._known[name].body.position for name in self._robots if name in self._known}
-        complete = len(robots) == len(self._robots) or now_s >= self._grace_until_s
+        complete = all(robot in self._known for robot in self._robots) or now_s >= self._grace_until_s
         if not due or self._planning or agent is None or not complete:
             return
-        self._planning, self._urgent = True, False
-        arguments = (agent.body.position, agent.body.path, robots, self._plan)
-        self._effects.append(Compute(PLANNING, self._planner.plan, arguments))
+        onset = self._dispatcher.onset()
+        self._urgent = onset is None
+        if onset is None:
+            return
+        self._planning = True
+        question = Question(
+            way=(agent.body.position, *agent.body.path),
+            onset=onset,
+            lead_s=self._dispatcher.lead_s,
+            previous=self._plan,
+            heading=self._dispatcher.heading,
+            lost=self._dispatcher.lost,
+        )
+        self._effects.append(Compute(PLANNING, self._planner.plan, (question,)))
 
     def _planned(self, done: JobDone, now_s: float) -> None:
-        """Take a plan over: as a new decision, as an update of the spares' places, or not at all."""
+        """Take over what was planned: a new decision, other places for the spares, another motion, or nothing new."""
         self._planning = False
-        if done.failure:
-            if done.failure != self._failure:
-                self._log("error", f"planning failed, the last deployment stands: {done.failure}")
-            self._failure = done.failure
-            return
-        self._effects.append(Record(Planned(planning_s=done.duration_s)))
-        plan, before = done.result, self._plan
+        self._complain("error", "planning failed, the last deployment stands: ", done.failure)
+        if not done.failure:
+            self._effects.append(Record(Planned(planning_s=done.duration_s)))
+            answer: Answer = done.result
+            self._decide(answer.plan, done.duration_s)
+            self._complain("error", "no motion to the deployment: ", answer.failure)
+            if answer.course is not None and self._dispatcher.take(answer.course):
+                self._complain("warning", "the motion is less than wished: ", answer.course.reason)
+        self._heed(now_s)
+
+    def _decide(self, plan: Plan, planning_s: float) -> None:
+        """Take a deployment over, and say so soon unless it is the same as before."""
+        before, orders = self._plan, self._orders
         self._plan = plan
         if plan.serves != (before is None or before.serves):
             self._log("info" if plan.serves else "warning", plan.reason)
         decides = before is None or _choice(plan) != _choice(before)
         if before is not None and not decides and plan.placements == before.placements:
             return
-        self._decisions += decides
-        deployment = Deployment(
-            authority=self._next_authority(),
+        self._orders = Deployment(
+            authority=self._authority,
             valid_for_s=self._mission.valid_for_s,
-            decision=self._decisions,
+            decision=(0 if orders is None else orders.decision) + decides,
             placements=plan.placements,
             edges=plan.edges,
             cost=_finite(plan.cost) or 0.0,
             total_cost_m=_finite(plan.total_cost_m),
             lower_bound_m=_finite(plan.lower_bound_m),
             relays_needed=plan.relays_needed,
-            reason=plan.reason[:500] if decides or self._said is None else self._said.reason,
+            reason=plan.reason[:500] if decides or orders is None else orders.reason,
         )
+        self._say_at_s = -math.inf
         if decides:
             changed = before is not None and set(map(frozenset, plan.edges)) != set(map(frozenset, before.edges))
             self._effects.append(
-                Record(Decision(deployment=deployment, planning_s=done.duration_s, topology_changed=changed))
+                Record(Decision(deployment=self._orders, planning_s=planning_s, topology_changed=changed))
             )
-        self._say(deployment, now_s)
 
-    def _say(self, deployment: Deployment, now_s: float) -> None:
-        self._said = deployment
-        self._repeat_at_s = now_s + deployment.valid_for_s / REPETITIONS
-        self._effects.append(Publish(deployment))
-
-    def _next_authority(self) -> Authority:
-        self._sequence += 1
-        return Authority(epoch=self._epoch, leader=self._name, sequence=self._sequence)
+    def _say(self, now_s: float) -> None:
+        """Order what stands, under the next authority."""
+        dispatcher = self._dispatcher
+        self._authority = structs.replace(self._authority, sequence=self._authority.sequence + 1)
+        self._orders = structs.replace(
+            self._orders or _first_orders(self._mission), authority=self._authority, motion=dispatcher.motion
+        )
+        if dispatcher.said(self._authority, now_s) and self._orders.motion is not None:
+            self._effects.append(Record(Ordered(motion=self._orders.motion)))
+        self._said_s = now_s
+        self._say_at_s = now_s + (AGAIN_S if dispatcher.pressing else self._orders.valid_for_s / REPETITIONS)
+        self._effects.append(Publish(self._orders))
 
     @property
     def _mode(self) -> Mode:
-        return "waiting" if self._said is None else "arrived"
+        return "waiting" if self._plan is None else "arrived"
 
     def _report(self) -> None:
         """Say and record where it is, and who sees whom."""
         still = (0.0, 0.0)
-        self._effects += (
-            Publish(State(position=self._position, velocity=still, mode=self._mode)),
-            Record(
-                Track(
-                    role="base_station",
-                    position=self._position,
-                    velocity=still,
-                    radius_m=self._mission.robot_radius_m,
-                    mode=self._mode,
-                )
-            ),
-            Record(self._connectivity()),
-        )
-
-    def _connectivity(self) -> Connectivity:
-        """True lines of sight between the places heard. Whoever is not heard is connected to nobody."""
         places = {self._name: self._position}
         for name in (self._agent, *self._robots):
             if name in self._known:
                 places[name] = self._known[name].body.position
-        points = list(places.values())
-        visible = self._environment.visibility_matrix(points)
-        rows = visible.tolist()
-        component = component_labels(visible)
-        agent_heard = self._agent in self._known
-        everybody = len(places) == 2 + len(self._robots)
-        return Connectivity(
-            links=tuple((points[i], points[j]) for i, j in combinations(range(len(points)), 2) if rows[i][j]),
-            agent_visible=agent_heard and sum(rows[1]) > 1,  # it is on the diagonal itself
-            chain_connected=bool(agent_heard and component[0] == component[1]),
-            team_connected=bool(everybody and component.max() == 0),
-            lambda2=algebraic_connectivity(visible) if everybody else 0.0,
-            tree_links=tuple(
-                (places[a], places[b])
-                for a, b in (self._said.edges if self._said is not None else ())
-                if a in places and b in places
+        edges = () if self._orders is None else self._orders.edges
+        complete = len(places) == 2 + len(self._robots)
+        self._effects += (
+            Publish(
+                State(
+                    position=self._position, velocity=still, mode=self._mode,
+                    obeying=self._authority, progress=self._dispatcher.progress,
+                )
             ),
-        )
+            Record(
+                Track(
+                    role="base_station", position=self._position, velocity=still,
+                    radius_m=self._mission.robot_radius_m, mode=self._mode,
+                )
+            ),
+            Record(judge_network(self._environment, self._name, self._agent, places, edges, complete)),
+        )  # fmt: skip
+
+    def _complain(self, level: Literal["warning", "error"], what: str, why: str) -> None:
+        """Log what is wrong; the same only once, however often it happens."""
+        if why and why != self._complaints.get(what):
+            self._log(level, f"{what}{why}")
+        self._complaints[what] = why
 
     def _log(self, level: Literal["info", "warning", "error"], text: str) -> None:
         self._effects.append(Record(LogLine(level=level, text=text)))
+
+
+def _first_orders(mission: Mission) -> Deployment:
+    """What is said before there is a plan: to hold."""
+    return Deployment(
+        authority=Authority(epoch=0, leader=mission.base_station.name, sequence=0),
+        valid_for_s=mission.valid_for_s, decision=0, placements=(), edges=(), cost=0.0, relays_needed=0,
+        reason="everybody holds before the first plan",
+    )  # fmt: skip
 
 
 def _finite(number: float | None) -> float | None:

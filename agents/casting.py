@@ -20,6 +20,7 @@ from protocol.messages import Point
 
 if TYPE_CHECKING:
     from agents.leader import DeploymentPlanner
+    from agents.team_planner import TeamPlanner
 
 CLEARANCE_M = 1e-3
 """Bodies may come this much nearer to walls than their paths do, so that rounding never stops them on a path."""
@@ -51,7 +52,7 @@ class Casting:
         mission, entry = self._mission, self._mission.entry(name)
         match entry.role:
             case "base_station":
-                return BaseStation(mission, self._environment, self.planner()), DiscDriver(entry.start, 0.0)
+                return BaseStation(mission, self._environment, self._team_planner()), DiscDriver(entry.start, 0.0)
             case "tracked_agent":
                 radius_m, speed_m_s = mission.agent_radius_m, mission.agent_speed_m_s
                 space = self._space(radius_m, entry.start)
@@ -71,6 +72,14 @@ class Casting:
         if self._known_planner is None:
             self._known_planner = self._build_planner()
         return self._known_planner
+
+    def _team_planner(self) -> TeamPlanner:
+        from agents.motion_planner import MotionPlanner
+        from agents.team_planner import TeamPlanner
+
+        deployments = self.planner()
+        motions = MotionPlanner(self._mission, self._environment, deployments.graph.geodesics, self._judge)
+        return TeamPlanner(deployments, motions, self._mission.agent_speed_m_s)
 
     def _build_planner(self) -> DeploymentPlanner:
         from agents.leader import DeploymentPlanner  # its imports take a quarter of a second, and one peer needs them

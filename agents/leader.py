@@ -120,8 +120,9 @@ class DeploymentPlanner:
         self._geodesics = self.graph.geodesics
         self._waiting = Waiting(self._geodesics, robot_radius_m, self.graph.positions)
         self._proposer = Proposer(
-            self.graph, base, search, robot_speed_m_s=robot_speed_m_s, agent_speed_m_s=agent_speed_m_s
-        )
+            self.graph, base, search, robot_speed_m_s=robot_speed_m_s, agent_speed_m_s=agent_speed_m_s,
+            apart_m=self._waiting.apart_m,
+        )  # fmt: skip
 
     def relays_needed(self, point: Point) -> int:
         """Fewest relays of a chain between the base station and an agent at this point.
@@ -141,7 +142,12 @@ class DeploymentPlanner:
         return int(self._proposer.relays_needed(self.graph.probes).max())
 
     def plan(
-        self, agent: Point, agent_path: Sequence[Point], robots: Mapping[str, Point], previous: Plan | None
+        self,
+        agent: Point,
+        agent_path: Sequence[Point],
+        robots: Mapping[str, Point],
+        previous: Plan | None,
+        obstacles: Sequence[Point] = (),
     ) -> Plan:
         """Decide where every robot goes.
 
@@ -150,6 +156,7 @@ class DeploymentPlanner:
             agent_path: what is left of its way, from where it is on; empty if it stands or says nothing.
             robots: where the robots are that can be counted on.
             previous: the plan before.
+            obstacles: where robots may stand that cannot be counted on.
 
         Returns:
             A plan that gives each of ``robots`` exactly one place.
@@ -166,9 +173,9 @@ class DeploymentPlanner:
         relays = () if previous is None else tuple(place for place in previous.placements if not place.spare)
         standing = self._standing(way, robots, relays, previous)
         names = [relay.robot for relay in relays if relay.robot in robots]
-        new = self._proposer.chains(way, robots, names) or [self._proposer.outward(agent, robots)]
+        new = self._proposer.chains(way, robots, names, obstacles) or [self._proposer.outward(agent, robots, obstacles)]
         chosen = self._best(standing, new, way, robots)
-        return self._complete(chosen, way, robots, needed, previous)
+        return self._complete(chosen, way, robots, needed, previous, obstacles)
 
     def _standing(
         self, way: Floats, robots: Mapping[str, Point], relays: tuple[Placement, ...], previous: Plan | None
@@ -201,7 +208,13 @@ class DeploymentPlanner:
         return standing
 
     def _complete(
-        self, chosen: Proposal, way: Floats, robots: Mapping[str, Point], needed: int, previous: Plan | None
+        self,
+        chosen: Proposal,
+        way: Floats,
+        robots: Mapping[str, Point],
+        needed: int,
+        previous: Plan | None,
+        obstacles: Sequence[Point],
     ) -> Plan:
         relays = chosen.relays
         names = [self._base_name, *(relay.robot for relay in relays), *([self._agent_name] if chosen.complete else [])]
@@ -211,7 +224,7 @@ class DeploymentPlanner:
             {} if previous is None else {place.robot: place.position for place in previous.placements if place.spare}
         )
         chain = [self._base, *(relay.position for relay in relays)]
-        waiting = self._waiting.places(self._inside(way[0]), chain, spares, before)
+        waiting = self._waiting.places(self._inside(way[0]), chain, spares, before, obstacles)
         placements = tuple(Placement(robot=name, position=place, spare=True) for name, place in waiting.items())
         return Plan(
             (*relays, *placements), tuple(pairwise(names)), chosen.cost, needed, chosen.complete, chosen.reason,

@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import groupby, pairwise
+from itertools import combinations, groupby, pairwise
 from typing import Final
 
 import numpy as np
@@ -36,6 +36,7 @@ from protocol.messages import Placement, Point
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 PREVIEWS_M: Final = (0.0, 1.5, 4.0, 8.0, 16.0)
 """How far ahead on the agent's path the proposed chains reach."""
@@ -93,30 +94,45 @@ class Proposer:
         search: see the module.
         robot_speed_m_s: of the robots.
         agent_speed_m_s: of the agent.
+        apart_m: least distance between the places of two relays, and between those and obstacles.
     """
 
     def __init__(
-        self, graph: PlacementGraph, base: Point, search: Search, *, robot_speed_m_s: float, agent_speed_m_s: float
+        self,
+        graph: PlacementGraph,
+        base: Point,
+        search: Search,
+        *,
+        robot_speed_m_s: float,
+        agent_speed_m_s: float,
+        apart_m: float,
     ) -> None:
         self._graph, self._base, self._search = graph, base, search
         self._speed_ratio = robot_speed_m_s / agent_speed_m_s
         self._from_base = METRES_PER_WEIGHT * graph.link_weights(base)
-        self._links = METRES_PER_WEIGHT * graph.weights
+        self._apart_m = apart_m
+        near = np.hypot(*(graph.positions[:, None] - graph.positions).transpose(2, 0, 1)) < apart_m
+        self._links = METRES_PER_WEIGHT * np.where(near, np.inf, graph.weights)
+        np.fill_diagonal(self._links, 0.0)
         self._relays = graph.relays_from(base)
 
-    def chains(self, way: Floats, robots: Mapping[str, Point], standing: Sequence[str]) -> list[Proposal]:
+    def chains(
+        self, way: Floats, robots: Mapping[str, Point], standing: Sequence[str], obstacles: Sequence[Point] = ()
+    ) -> list[Proposal]:
         """One for each preview that the robots suffice for.
 
         Args:
             way: (m, 2) float, metres: the agent's, from where it is.
             robots: where they are, in free space.
             standing: relays of the chain that there is, from the base outward.
+            obstacles: where nobody can stand.
         """
         order = _order(way[0], robots, standing)
         tree = _tree(order, standing)
         drive = np.array([self._graph.distances_from(robots[name]) for name in order]).reshape(
             len(order), len(self._graph)
         )
+        drive[:, self._taken(obstacles)] = np.inf
         previews = sorted({min(preview, length(way)) for preview in PREVIEWS_M})
         found = [self._chain(way, preview, order, drive, self._search, tree) for preview in previews]
         if self._search in ("one-edge", "fixed") and not any(found):
@@ -143,6 +159,8 @@ class Proposer:
             to_agent = np.where(sees, METRES_PER_WEIGHT * weights, np.inf)
             found = self._find(move, to_agent, search, tree)
             if found is not None:
+                if self._crowded(found.places):
+                    continue
                 relays = tuple(
                     self._placement(order[robot], place)
                     for robot, place in zip(found.robots, found.places, strict=True)
@@ -195,17 +213,27 @@ class Proposer:
         needed[np.isfinite(self._graph.direct_weights(self._base, places))] = 0
         return needed
 
-    def outward(self, agent: Point, robots: Mapping[str, Point]) -> Proposal:
+    def _taken(self, obstacles: Sequence[Point]) -> Bools:
+        """Which placements are too near to obstacles."""
+        gaps = self._graph.positions[:, None] - np.reshape(obstacles, (-1, 2))
+        return np.any(np.hypot(gaps[..., 0], gaps[..., 1]) < self._apart_m, axis=1)  # type: ignore[no-any-return]
+
+    def _crowded(self, places: Sequence[int]) -> bool:
+        """Whether two placements are too near to each other. Neighbours in a chain never are."""
+        points = self._graph.positions[list(places)].tolist()
+        return any(math.dist(one, other) < self._apart_m for one, other in combinations(points, 2))
+
+    def outward(self, agent: Point, robots: Mapping[str, Point], obstacles: Sequence[Point] = ()) -> Proposal:
         """Too few robots for a chain: those that there are man one of fewest relays from the base outward.
 
         The agent's place must be one that a chain reaches.
         """
-        weights = self._graph.link_weights(agent)
+        weights = np.where(self._taken(obstacles), np.inf, self._graph.link_weights(agent))
         needed = int(self.relays_needed(agent)[0])
         # Back to the base, where there is a choice by the cheapest link.
         places = [int(np.argmin(np.where(self._relays == needed, weights, np.inf)))]
         for relays in range(needed - 1, 0, -1):
-            places.insert(0, int(np.argmin(np.where(self._relays == relays, self._graph.weights[places[0]], np.inf))))
+            places.insert(0, int(np.argmin(np.where(self._relays == relays, self._links[places[0]], np.inf))))
         places = places[: len(robots)]
         names = list(robots)
         costs = np.array([self._graph.distances_from(place)[places] for place in robots.values()])

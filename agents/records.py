@@ -10,7 +10,7 @@ from typing import Literal, TypeAlias
 
 import msgspec
 
-from protocol.messages import Deployment, Mode, Point, RoleName
+from protocol.messages import Deployment, Mode, Motion, Point, RoleName
 
 
 class Track(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag="track"):
@@ -45,6 +45,12 @@ def in_words(deployment: Deployment) -> str:
     return f"costs {cost_m:.1f} m, such chains at least {bound_m:.1f} m"
 
 
+class Ordered(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag="ordered"):
+    """The leader has ordered a motion for the first time: a new plan, or a revision of it."""
+
+    motion: Motion
+
+
 class Planned(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag="planned"):
     """A planning job has ended, whatever came of it."""
 
@@ -73,4 +79,4 @@ class LogLine(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag
     text: str
 
 
-AnyRecord: TypeAlias = Track | Decision | Planned | Connectivity | LogLine
+AnyRecord: TypeAlias = Track | Decision | Ordered | Planned | Connectivity | LogLine

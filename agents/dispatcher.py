@@ -1,0 +1,208 @@
+"""The dispatcher of the team's motion: begins plans at a standstill, goes on with them, and begins afresh when it must.
+
+A plan goes on for as long as all robots that are heard have accepted it. It ends when a robot is lost or heard anew,
+refuses, or knows nothing of it any more. Then everybody is told to hold; when all that are heard say that they stand,
+the next plan begins from there.
+
+A robot that is lost may still go as far as was released; then it stands. Its way until there is in the way of others.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.motion_message import end_stage
+from agents.movement_authority import MovementAuthority, Onset
+from protocol.messages import Authority, Motion, Point, Progress, State
+
+if TYPE_CHECKING:
+    from agents.motion_planner import Course
+
+Floats = NDArray[np.float64]
+
+STILL_M_S: Final = 1e-6
+"""Slower than this is standing."""
+
+HORIZON_S: Final = 0.3
+"""Stages are released that begin so long after the one that the slowest robot is in."""
+
+PATIENCE_S: Final = 2.0
+"""A robot that is heard, and has not accepted a revision for so long, does not know the plan."""
+
+
+class Dispatcher:
+    """See the module.
+
+    Args:
+        base: name of the base station.
+        position: where it stands, metres, map frame.
+        starts: where each robot of the roster is while nothing is heard of it.
+        epoch: of the leader's authority.
+    """
+
+    def __init__(self, base: str, position: Point, starts: Mapping[str, Point], epoch: int) -> None:
+        self._base, self._position, self._epoch = base, position, epoch
+        self._authority: MovementAuthority | None = None
+        self._ended: MovementAuthority | None = None
+        """The last one, as long as there is no other."""
+        self._heading: Mapping[str, Point] = {}
+        self._plan = 0
+        """Number of the present plan, or of the next."""
+        self._held: Authority | None = None
+        """The first order to hold since the last plan ended."""
+        self._ordered: Authority | None = None
+        """The first order of the present revision."""
+        self._ordered_s = 0.0
+        self._lost: dict[str, Floats] = {name: np.array([place]) for name, place in starts.items()}
+        self._states: dict[str, State] = {}
+        self.reports: list[str] = []
+        """Why plans have ended; whoever reads it empties it."""
+        self.news = False
+        """Whether there is more to order than was ordered last."""
+
+    @property
+    def motion(self) -> Motion | None:
+        """What to order; None: to hold."""
+        return None if self._authority is None else self._authority.motion
+
+    @property
+    def pressing(self) -> bool:
+        """Whether somebody has yet to hear of the last order."""
+        if self._authority is None:
+            return bool(self._states) and not self._all_stand()
+        return bool(self._authority.undecided)
+
+    @property
+    def progress(self) -> Progress | None:
+        """The base station's own, which stands."""
+        known = self._authority
+        if known is None:
+            return None
+        motion = known.motion
+        return Progress(epoch=known.epoch, plan=motion.plan, revision=motion.revision, finished=end_stage(motion))
+
+    @property
+    def heading(self) -> Mapping[str, Point]:
+        """Where the motion under way leads; empty if to no goals."""
+        return self._heading
+
+    @property
+    def lost(self) -> dict[str, Floats]:
+        """Where robots may be that are not heard, (m, 2) each, metres."""
+        return dict(self._lost)
+
+    def said(self, authority: Authority, now_s: float) -> bool:
+        """Note under which authority what is to be ordered has been; whether it was the first order of a revision."""
+        self.news = False
+        if self._authority is None:
+            self._held = self._held or authority
+        elif self._ordered is None:
+            self._ordered, self._ordered_s = authority, now_s
+            return True
+        return False
+
+    def hear(self, robot: str, state: State, now_s: float) -> None:
+        """Learn from a robot of the roster where and how far it is."""
+        before = self._states.get(robot)
+        self._states[robot] = state
+        if before is None:
+            del self._lost[robot]
+            self._begin_afresh("")
+        elif self._authority is not None:
+            self._judge(self._authority, robot, before, state, now_s)
+
+    def lose(self, robot: str) -> None:
+        """Do without a robot of the roster."""
+        state = self._states.pop(robot)
+        way = np.array([state.position])
+        authority = self._authority or self._ended
+        if authority is not None and robot in authority.robots and _plan(state) == (self._epoch, authority.motion.plan):
+            way = np.concatenate((way, np.array(authority.way(robot))))
+        self._lost[robot] = way
+        self._begin_afresh("")
+
+    def release(self) -> None:
+        """Let the robots go on as far as is due."""
+        if self._authority is not None and self._authority.release(HORIZON_S):
+            self.news = True
+
+    @property
+    def lead_s(self) -> float:
+        """How long it is until the robots are at the onset."""
+        return 0.0 if self._authority is None else self._authority.lead_s()
+
+    def onset(self) -> Onset | None:
+        """Where the next motion can begin if no more is released; None: as soon as everybody stands."""
+        if self._authority is not None:
+            self._authority.prune()
+            return self._authority.onset()
+        if not self._all_stand():
+            return None
+        places = {self._base: self._position} | {name: state.position for name, state in self._states.items()}
+        return Onset(self._plan, 0, 0, places)
+
+    def take(self, course: Course) -> bool:
+        """Order a motion, unless the plan that it belongs to has ended or nobody would move; whether it is taken."""
+        motion, known = course.motion, self._authority
+        if motion.plan != self._plan or (known is not None and known.over and not _moves(motion)):
+            return False
+        if known is None:
+            self._authority = MovementAuthority(self._epoch, motion, list(course.goals))
+            self._held = self._ended = None
+        else:
+            known.revise(motion)
+        self._heading = course.goals if course.arrives else {}
+        self._ordered, self.news = None, True
+        return True
+
+    def _judge(self, authority: MovementAuthority, robot: str, before: State, state: State, now_s: float) -> None:
+        """Take a report to account, or end the plan if it contradicts."""
+        if state.progress is not None:
+            authority.hear(robot, state.progress)
+        ours = (self._epoch, self._plan)
+        if _plan(before) == ours and _plan(state) != ours:
+            self._begin_afresh(f"{robot} does not follow plan {self._plan} any more")
+        elif self._ordered is None or robot not in authority.undecided:
+            return
+        elif state.refusing and _has_heard(state, self._ordered):
+            revision = authority.motion.revision
+            self._begin_afresh(f"{robot} refuses revision {revision} of plan {self._plan}: {state.refusing}")
+        elif now_s - self._ordered_s > PATIENCE_S:
+            self._begin_afresh(f"{robot} has not accepted a revision for {PATIENCE_S:g} s")
+
+    def _begin_afresh(self, why: str) -> None:
+        if why:
+            self.reports.append(f"{why}: everybody holds, then a new plan begins")
+        self.news = True
+        self._ended = self._authority or self._ended
+        self._authority = self._held = self._ordered = None
+        self._heading = {}
+        self._plan += 1
+
+    def _all_stand(self) -> bool:
+        held = self._held
+        return held is not None and all(_stands(state, held) for state in self._states.values())
+
+
+def _moves(motion: Motion) -> bool:
+    """Whether anybody that is scheduled does."""
+    return any(way.scheduled and len(way.waypoints) > 1 for way in motion.ways)
+
+
+def _stands(state: State, since: Authority) -> bool:
+    """Whether a robot says that it stands and follows no motion, having heard a command."""
+    return state.progress is None and _has_heard(state, since) and math.hypot(*state.velocity) < STILL_M_S
+
+
+def _plan(state: State) -> tuple[int, int] | None:
+    return None if state.progress is None else (state.progress.epoch, state.progress.plan)
+
+
+def _has_heard(state: State, authority: Authority) -> bool:
+    heard = state.obeying
+    return heard is not None and (heard.epoch, heard.sequence) >= (authority.epoch, authority.sequence)

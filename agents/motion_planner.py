@@ -1,0 +1,203 @@
+"""How the team gets from where it is to where it is to stand: the leader's second job, after who stands where.
+
+The agent is independent. It waits for nobody, so of it is planned only where it will be in the next moments
+(:data:`FORESIGHT_S`): anywhere on that way, at any time. And it has no body here, for nobody can promise to keep out of
+the way of somebody who goes where he likes. Robots that are not heard any more stand somewhere on the way that they
+were last allowed, and are in the way of all others.
+
+What is asked of lines of sight, from strict to lax, and the first that can be had is taken:
+
+1. the whole team and the agent's next moments are one network,
+2. base station and robots are,
+3. base station and the last relays, of this deployment and of the one before, are, over any others,
+4. nothing: the discs only keep apart.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from msgspec import structs
+from numpy.typing import NDArray
+
+from agents.mission import Mission
+from agents.motion_message import to_motion
+from agents.movement_authority import Onset
+from planning.foresight import walk
+from planning.motion_plan import Schedule
+from planning.no_schedule import NoSchedule
+from planning.schedule import schedule
+from planning.short_stages import shorten
+from protocol.messages import Motion, Point
+
+if TYPE_CHECKING:
+    from agents.certificate_judge import Judge
+    from planning.environment import Environment
+    from planning.geodesic import GeodesicMap
+
+Floats = NDArray[np.float64]
+
+FORESIGHT_S: Final = 1.0
+"""So much of the agent's way is to stay in sight throughout."""
+
+STAGE_S: Final = 0.25
+"""Stages are cut to this duration, so that those released reach no farther than they must."""
+
+GROWTH: Final = 0.15
+"""So much longer may stages be for each second that they are ahead."""
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """A motion from its onset on."""
+
+    motion: Motion
+    """With what goes on from before."""
+    goals: Mapping[str, Point]
+    """Where the robots are to go."""
+    arrives: bool
+    """Whether all of them get there."""
+    reason: str = ""
+    """Why not everybody arrives, or stays in sight of all others; a sentence."""
+
+
+class MotionPlanner:
+    """Plans motions. Every answer is a function of its arguments alone.
+
+    Args:
+        mission: roster, radius and speeds.
+        environment: the map as drawn.
+        geodesics: shortest paths of the robots' centres.
+        judge: certifies as the robots will.
+    """
+
+    def __init__(self, mission: Mission, environment: Environment, geodesics: GeodesicMap, judge: Judge) -> None:
+        self._mission, self._environment = mission, environment
+        self._geodesics, self._judge = geodesics, judge
+        self.base, self._agent = mission.base_station.name, mission.tracked_agent.name
+
+    def plan(
+        self, onset: Onset, goals: Mapping[str, Point], ends: Sequence[str], way: Floats, lost: Mapping[str, Floats]
+    ) -> Course:
+        """A motion to ``goals``.
+
+        Args:
+            onset: where it begins.
+            goals: for each robot of the onset.
+            ends: the last relays of the deployments before and after.
+            way: (m, 2) float, metres: the agent's, from where it will be at the onset.
+            lost: (m, 2) each: where robots may be that are not heard any more.
+
+        Returns:
+            The best that is possible; at worst everybody stays where the onset is.
+
+        Raises:
+            ValueError: not even that is certified: somebody is where it cannot be.
+
+        Complexity: that of a schedule, for each demand that cannot be met and the first that can.
+        """
+        robots, mission = list(goals), self._mission
+        obstacles = {name: self._obstacle(way, onset) for name, way in lost.items()}
+        paths = {
+            self.base: np.array([onset.places[self.base]]),
+            **{name: self._path(onset.places[name], goals[name]) for name in robots},
+            self._agent: _begin(way, FORESIGHT_S * mission.agent_speed_m_s),
+            **obstacles,
+        }
+        bodies = {*robots, *obstacles}
+        reason = ""
+        for joined in self._demands(robots, ends):
+            try:
+                found = schedule(
+                    list(paths.values()),
+                    [mission.robot_radius_m if name in bodies else 0.0 for name in paths],
+                    self._environment,
+                    joined=joined,
+                    members=list(paths),
+                    speed_m_s=[
+                        mission.agent_speed_m_s if name == self._agent else mission.robot_speed_m_s for name in paths
+                    ],
+                    unscheduled=[self._agent, *obstacles],
+                )
+            except NoSchedule as problem:
+                reason, best = reason or problem.text, problem.best
+            else:
+                return self._certify(onset, found, joined, goals, True, reason)
+        return self._certify(onset, best, frozenset(), goals, False, reason)
+
+    def _demands(self, robots: Sequence[str], ends: Sequence[str]) -> Iterator[frozenset[str]]:
+        """What is asked of lines of sight, from strict to lax (see the module)."""
+        team = frozenset((self.base, *robots))
+        demands = [team | {self._agent}, team]
+        if ends:
+            demands.append(frozenset((self.base, *ends)))
+        yield from dict.fromkeys((*demands, frozenset[str]()))
+
+    def _certify(
+        self,
+        onset: Onset,
+        found: Schedule,
+        joined: frozenset[str],
+        goals: Mapping[str, Point],
+        arrives: bool,
+        reason: str,
+    ) -> Course:
+        """The course, with the strictest of its demands that what is kept of the last motion meets too."""
+        motion = onset.continued(
+            to_motion(
+                shorten(found, STAGE_S, GROWTH), plan=0, revision=0, first_stage=0, released=-1, connection="none"
+            )
+        )
+        for demand in dict.fromkeys((joined, joined - {self._agent}, joined & _joined(onset.kept), frozenset[str]())):
+            motion = _demand(motion, demand)
+            fault = self._judge(motion)
+            if not fault:
+                return Course(motion, goals, arrives, reason)
+        raise ValueError(f"the motion planned is not certified: {fault}")
+
+    def _path(self, start: Point, goal: Point) -> Floats:
+        return np.array([start]) if start == goal else self._geodesics.path(start, goal)
+
+    def _obstacle(self, way: Floats, onset: Onset) -> Floats:
+        """Where a lost robot may be; if others stand there, only where it was heard last."""
+        robots = [place for name, place in onset.places.items() if name != self.base]
+        near = _distance(way, np.array(robots).reshape(-1, 2)) if robots else math.inf
+        return way if near > 2 * self._mission.robot_radius_m else way[:1]
+
+
+def _demand(motion: Motion, joined: frozenset[str]) -> Motion:
+    """A motion in which these members are to stay in one network."""
+    if joined.issuperset(way.member for way in motion.ways):
+        return structs.replace(motion, connection="team", joined=())
+    if len(joined) > 1:
+        return structs.replace(motion, connection="joined", joined=tuple(sorted(joined)))
+    return structs.replace(motion, connection="none", joined=())
+
+
+def _joined(motion: Motion | None) -> frozenset[str]:
+    """Members that a motion keeps in one network."""
+    if motion is None:
+        return frozenset()
+    return frozenset(way.member for way in motion.ways) if motion.connection == "team" else frozenset(motion.joined)
+
+
+def _begin(way: Floats, length_m: float) -> Floats:
+    """The first metres of a way (m, 2)."""
+    passed_m = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(way, axis=0).T))))
+    if passed_m[-1] <= length_m:
+        return way
+    return np.concatenate((way[passed_m < length_m], walk(way, np.array([length_m]))))
+
+
+def _distance(way: Floats, places: Floats) -> float:
+    """How near any of some places (n, 2) is to a way (m, 2), metres."""
+    starts, steps = way[:-1], np.diff(way, axis=0)
+    if len(steps) == 0:
+        starts, steps = way, np.zeros((1, 2))
+    squares = np.maximum((steps**2).sum(axis=1), np.finfo(float).tiny)
+    shares = np.clip(((places[:, None] - starts) * steps).sum(axis=2) / squares, 0.0, 1.0)
+    return float(np.hypot(*(places[:, None] - starts - shares[..., None] * steps).transpose(2, 0, 1)).min())
