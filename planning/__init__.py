@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from planning.certificate import Certificate, certify
     from planning.chain import Chain, chain_between, cheapest_chain
     from planning.compiled_map import CompiledMap
+    from planning.coordination_diagram import CoordinationDiagram
     from planning.decomposition import Cells, decompose
     from planning.deployment import Deployment, identify_robots, shortest_path_deployment
     from planning.deployment_sequence import DeploymentSequence, identify_deployment, identify_sequence, physical_cost
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from planning.environment import Environment
     from planning.forecast import forecast_cells
     from planning.geodesic import GeodesicMap
+    from planning.hybrid_schedule import adjacency_schedule, hybrid_schedule
     from planning.motion_plan import Schedule, TimedPath
     from planning.mutual_visibility import mutual_visibility
     from planning.no_schedule import NoSchedule
@@ -48,6 +50,7 @@ __all__ = [
     "Certificate",
     "Chain",
     "CompiledMap",
+    "CoordinationDiagram",
     "Deployment",
     "DeploymentSequence",
     "Environment",
@@ -61,6 +64,7 @@ __all__ = [
     "TimedPath",
     "Tree",
     "adjacency_path_weights",
+    "adjacency_schedule",
     "all_pairs",
     "arrival_times",
     "bounded_weights",
@@ -73,6 +77,7 @@ __all__ = [
     "forecast_cells",
     "from_source",
     "geodesic_weights",
+    "hybrid_schedule",
     "identify_deployment",
     "identify_robots",
     "identify_sequence",
@@ -93,6 +98,7 @@ _HOMES = {
     "Certificate": "planning.certificate",
     "Chain": "planning.chain",
     "CompiledMap": "planning.compiled_map",
+    "CoordinationDiagram": "planning.coordination_diagram",
     "Deployment": "planning.deployment",
     "DeploymentSequence": "planning.deployment_sequence",
     "Environment": "planning.environment",
@@ -106,6 +112,7 @@ _HOMES = {
     "TimedPath": "planning.motion_plan",
     "Tree": "planning.tree",
     "adjacency_path_weights": "planning.physical_weights",
+    "adjacency_schedule": "planning.hybrid_schedule",
     "all_pairs": "planning.shortest_paths",
     "arrival_times": "planning.physical_weights",
     "bounded_weights": "planning.physical_weights",
@@ -118,6 +125,7 @@ _HOMES = {
     "forecast_cells": "planning.forecast",
     "from_source": "planning.shortest_paths",
     "geodesic_weights": "planning.physical_weights",
+    "hybrid_schedule": "planning.hybrid_schedule",
     "identify_deployment": "planning.deployment_sequence",
     "identify_robots": "planning.deployment",
     "identify_sequence": "planning.deployment_sequence",

@@ -138,8 +138,9 @@ def _line_is_free(
     and after it, and are allowed as these are.
     """
     k = a.shape[0]
-    way = np.sign(b - a)
+    way = np.empty(k, np.int64)
     for i in range(k):
+        way[i] = 1 if b[i] > a[i] else -1 if b[i] < a[i] else 0
         elements[i] = 2 * a[i] + way[i]
     while True:
         if not _admits(elements, sizes, starts, blocked, seen, joined, part):
@@ -200,14 +201,22 @@ def _find_slot(at: Ints, points: Ints, slots: Ints) -> int:
 
 
 @kernel
-def _double(points: Ints, known: int) -> tuple[Ints, Ints]:
+def _double(
+    points: Ints, costs: Floats, turned_at: Ints, done: Bools, known: int
+) -> tuple[Ints, Floats, Ints, Bools, Ints]:
     """Room for twice as many points, and their hash table."""
-    larger = np.zeros((2 * points.shape[0], points.shape[1]), np.int64)
-    larger[:known] = points[:known]
-    slots = np.full(4 * larger.shape[0], -1)
+    size, k = 2 * points.shape[0], points.shape[1]
+    more_points, more_costs = np.zeros((size, k), np.int64), np.zeros(size)
+    more_turned_at, more_done = np.zeros(size, np.int64), np.zeros(size, np.bool_)
+    slots = np.empty(4 * size, np.int64)
+    for slot in range(4 * size):
+        slots[slot] = -1
     for point in range(known):
-        slots[_find_slot(larger[point], larger, slots)] = point
-    return larger, slots
+        for i in range(k):
+            more_points[point, i] = points[point, i]
+        more_costs[point], more_turned_at[point], more_done[point] = costs[point], turned_at[point], done[point]
+        slots[_find_slot(more_points[point], more_points, slots)] = point
+    return more_points, more_costs, more_turned_at, more_done, slots
 
 
 @kernel
@@ -257,9 +266,10 @@ def _search(
     following, elements, on_line, part = (
         np.empty(k, np.int64), np.empty(k, np.int64), np.empty(k, np.int64), np.empty(k, np.int64)
     )  # fmt: skip
-    points = np.zeros((256, k), np.int64)
-    points, slots = _double(points, 1)
-    costs, turned_at, done = np.zeros(len(points)), np.zeros(len(points), np.int64), np.zeros(len(points), np.bool_)
+    points, costs = np.zeros((256, k), np.int64), np.zeros(256)
+    turned_at, done = np.zeros(256, np.int64), np.zeros(256, np.bool_)
+    slots = np.full(1024, -1)
+    slots[_find_slot(points[0], points, slots)] = 0
     known, successors = 1, 0
     unit = _SAME * _span(points[0], last, limits, firsts, pace) + 1e-300
     nearest, least_left = 0, _measure_left(points[0], limits, firsts, pace)
@@ -272,13 +282,16 @@ def _search(
         done[point] = True
         if left < least_left:
             nearest, least_left = point, left
-        if np.all(points[point] == last):
+        going = 0
+        for i in range(k):
+            going += 1 if points[point, i] < last[i] else 0
+        if going == 0:
             nearest, status = point, _FOUND
             break
         if successors > most:
             status = _GAVE_UP
             break
-        for move in range(1, (1 << np.sum(points[point] < last)) + k):
+        for move in range(1, (1 << going) + k):
             successors += 1
             if successors > most:
                 break
@@ -292,15 +305,13 @@ def _search(
                 continue
             if target < 0:
                 if known == len(points):
-                    points, slots = _double(points, known)
+                    points, costs, turned_at, done, slots = _double(points, costs, turned_at, done, known)
                     slot = _find_slot(following, points, slots)
-                    costs = np.concatenate((costs, np.zeros(known)))
-                    turned_at = np.concatenate((turned_at, np.zeros(known, np.int64)))
-                    done = np.concatenate((done, np.zeros(known, np.bool_)))
                 target = known
                 known += 1
                 slots[slot] = target
-                points[target] = following
+                for i in range(k):
+                    points[target, i] = following[i]
                 costs[target] = np.inf
             turn = turned_at[point]
             cost = costs[turn] + _span(points[turn], following, limits, firsts, pace)
@@ -322,6 +333,7 @@ def _search(
     route = np.zeros((turns, k), np.int64)
     point = nearest
     for turn in range(turns - 1, 0, -1):
-        route[turn] = points[point]
+        for i in range(k):
+            route[turn, i] = points[point, i]
         point = turned_at[point]
     return status, route
