@@ -64,6 +64,8 @@ class Dispatcher:
         """Why plans have ended; whoever reads it empties it."""
         self.news = False
         """Whether there is more to order than was ordered last."""
+        self._due = False
+        """Whether more may be released than was when that was looked at last."""
 
     @property
     def motion(self) -> Motion | None:
@@ -128,8 +130,9 @@ class Dispatcher:
 
     def release(self) -> None:
         """Let the robots go on as far as is due."""
-        if self._authority is not None and self._authority.release(HORIZON_S):
+        if self._authority is not None and self._due and self._authority.release(HORIZON_S):
             self.news = True
+        self._due = False
 
     @property
     def lead_s(self) -> float:
@@ -157,13 +160,13 @@ class Dispatcher:
         else:
             known.revise(motion)
         self._heading = course.goals if course.arrives else {}
-        self._ordered, self.news = None, True
+        self._ordered, self.news, self._due = None, True, True
         return True
 
     def _judge(self, authority: MovementAuthority, robot: str, before: State, state: State, now_s: float) -> None:
         """Take a report to account, or end the plan if it contradicts."""
-        if state.progress is not None:
-            authority.hear(robot, state.progress)
+        if state.progress is not None and authority.hear(robot, state.progress):
+            self._due = True
         ours = (self._epoch, self._plan)
         if _plan(before) == ours and _plan(state) != ours:
             self._begin_afresh(f"{robot} does not follow plan {self._plan} any more")

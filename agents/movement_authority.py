@@ -170,17 +170,23 @@ class MovementAuthority:
         return way.waypoints[way.stages[first] : way.stages[end] + 1]
 
     def _clock(self) -> list[tuple[float, float]]:
-        """When each stage begins and ends at full speed, seconds from when that of the slowest robot begins."""
+        """When each stage begins and ends at full speed, seconds from when that of the slowest robot begins.
+
+        A stage begins when the first begins it that moves in it.
+        """
         first = self.finished - self.motion.first_stage
         ready_s = [0.0] * len(self._takes_s)
         clock: list[tuple[float, float]] = []
         for stage in range(end_stage(self.motion) - self.finished):
             earliest_s = clock[stage - 2][1] if stage > 1 else 0.0
             begins_s = [max(time_s, earliest_s) for time_s in ready_s]
+            moving_s = [
+                begin_s for begin_s, own in zip(begins_s, self._takes_s, strict=True) if own[first + stage] > 0.0
+            ]
             ready_s = [
                 begin_s + takes_s[first + stage] for begin_s, takes_s in zip(begins_s, self._takes_s, strict=True)
             ]
-            clock.append((min(begins_s, default=0.0), max(ready_s, default=0.0)))
+            clock.append((min(moving_s or begins_s), max(ready_s)))
         return clock
 
 
