@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from agents.base_station import BaseStation
 from agents.behaviour import begin
+from agents.certificate_judge import certificate_judge
 from agents.leader import DeploymentPlanner
 from agents.robot import Robot
 from agents.role import Heard, JobDone, Role
@@ -28,7 +29,10 @@ from protocol.messages import (
     GoalReply,
     Heartbeat,
     Intent,
+    MemberWay,
+    Motion,
     Placement,
+    Progress,
     State,
     kind_of,
 )  # fmt: skip
@@ -46,12 +50,46 @@ places = st.tuples(coordinates, coordinates)
 names = st.sampled_from([*PEERS, "stranger"])
 counts = st.integers(0, 2**62)
 paths = st.lists(places, max_size=3).map(tuple)
-modes = st.sampled_from(["waiting", "moving", "arrived", "holding"])
+modes = st.sampled_from(["waiting", "moving", "yielding", "arrived", "holding"])
 authorities = st.builds(Authority, epoch=counts, leader=names, sequence=counts)
 placements = st.builds(Placement, robot=names, position=places, cell=st.none() | st.integers(), spare=st.booleans())
+progresses = st.builds(Progress, epoch=counts, plan=counts, revision=counts, finished=counts)
+few = st.integers(0, 3)
+extents = st.sampled_from([0.0, 0.2, 1.0, 1e7])
+ways = st.builds(
+    MemberWay,
+    member=names,
+    radius_m=extents,
+    speed_m_s=extents,
+    waypoints=st.lists(places, min_size=1, max_size=4).map(tuple),
+    stages=st.lists(few, min_size=2, max_size=4).map(tuple),
+    scheduled=st.booleans(),
+)
+stand = st.sampled_from([("base", (1.0, 1.0)), ("robot1", (1.0, 1.0)), ("robot2", (4.0, 1.0))])
+fair_ways = st.builds(
+    lambda member, step, speed_m_s: MemberWay(
+        member=member[0], radius_m=0.2, speed_m_s=speed_m_s, stages=(0, 1, 1),
+        waypoints=(member[1], (member[1][0], member[1][1] + step)),
+    ),
+    stand, st.sampled_from([0.25, 1.0, 30.0]), st.sampled_from([0.5, 1.0]),
+)  # fmt: skip
+motions = st.builds(
+    Motion,
+    plan=few,
+    revision=few,
+    first_stage=st.integers(0, 1) | counts,
+    released=st.integers(-1, 3) | counts,
+    ways=st.lists(ways, min_size=1, max_size=3).map(tuple)
+    | st.lists(fair_ways, min_size=1, max_size=3, unique_by=lambda way: way.member).map(tuple),
+    connection=st.sampled_from(["team", "joined", "none"]),
+    joined=st.lists(names, max_size=3).map(tuple),
+)
 bodies: st.SearchStrategy[AnyBody] = st.one_of(
     st.builds(Heartbeat, role=st.just("robot"), mode=modes),
-    st.builds(State, position=places, velocity=places, mode=modes, target=st.none() | places, path=paths),
+    st.builds(
+        State, position=places, velocity=places, mode=modes, target=st.none() | places, path=paths,
+        progress=st.none() | progresses,
+    ),
     st.builds(Intent, position=places, velocity=places, mode=modes, goal=st.none() | places, path=paths),
     st.builds(Goal, goal=places, correlation=st.text(min_size=1, max_size=3)),
     st.builds(GoalReply, correlation=st.text(max_size=3), accepted=st.booleans()),
@@ -60,6 +98,7 @@ bodies: st.SearchStrategy[AnyBody] = st.one_of(
         placements=st.lists(placements, max_size=4).map(tuple),
         edges=st.lists(st.tuples(names, names), max_size=4).map(tuple),
         cost=st.floats(allow_nan=False), relays_needed=counts, reason=st.text(max_size=5),
+        motion=st.none() | motions,
     ),
 )  # fmt: skip
 comings = st.sampled_from([PeerAppeared, PeerVanished]).flatmap(lambda kind: names.map(kind))
@@ -71,7 +110,7 @@ def make_base() -> Role:
 
 
 def make_robot() -> Role:
-    return Robot(MISSION, "robot1", ROUTES)
+    return Robot(MISSION, "robot1", certificate_judge(MISSION, CORNER))
 
 
 def make_agent() -> Role:

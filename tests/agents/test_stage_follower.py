@@ -276,6 +276,17 @@ def test_who_does_not_move_is_not_waited_for() -> None:
     assert mine.steer((2.0, 0.0)) != STANDING
 
 
+def test_takes_the_leaders_word_for_what_all_have_finished() -> None:
+    rows = [[1, 1, 1], [1, 1, 1]]
+    mine = follower(motion(rows, released=2))
+    for place in (0.0, 1.0):
+        mine.steer((place, 0.0))
+    mine.hear("robot1", said(0))
+    assert mine.steer((2.0, 0.0)) == STANDING
+    mine.release(motion(rows, first_stage=1, released=2))
+    assert mine.steer((2.0, 0.0)) == Leg((1.0, 0.0), 1.0)
+
+
 def test_nobody_waits_for_the_unscheduled() -> None:
     order = motion([[1, 1, 1], [1, 1, 1]], released=2)
     *others, agent = order.ways
