@@ -31,7 +31,7 @@ has no guarantee in motion (§4.3.5 and chapter 5).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -80,8 +80,8 @@ def certify(
     radius_m: ArrayLike | None = None,
     *,
     speed_m_s: ArrayLike | None = None,
-    links: Sequence[tuple[Name, Name]] | None = None,
-    ends: Sequence[Name] | None = None,
+    links: Collection[tuple[Name, Name]] | None = None,
+    ends: Collection[Name] | None = None,
 ) -> Certificate:
     """Judge a schedule against a map, the robots' bodies and speeds, and the chain.
 
@@ -113,7 +113,7 @@ def certify(
             schedule.stages,
             schedule.unscheduled,
         )
-    required = None if links is None else sorted({(min(pair), max(pair)) for pair in _find_links(schedule, links)})
+    required = None if links is None else sorted(set(_find_links(schedule, links)))
     joined = None if ends is None else _find_rows(schedule, ends)
     depth = 2.0 * environment.tolerance_m
     walls = recede_walls(environment.walls, environment.successors, depth)
@@ -126,8 +126,8 @@ def certify(
     return Certificate(tuple(sorted(violations, key=lambda violation: violation.time_s)))
 
 
-def _find_rows(schedule: Schedule, names: Sequence[Name]) -> list[int]:
-    """Rows of members that are to be joined, two or more, all different."""
+def _find_rows(schedule: Schedule, names: Collection[Name]) -> list[int]:
+    """Rows of members that are to be joined, two or more, all different, in order."""
     rows: list[int] = []
     for name in names:
         row = schedule.members.index(name) if name in schedule.members else name
@@ -138,14 +138,15 @@ def _find_rows(schedule: Schedule, names: Sequence[Name]) -> list[int]:
         rows.append(int(row))
     if len(rows) < 2:
         raise InvalidSchedule(f"{len(rows)} members are asked to be joined: name at least two")
-    return rows
+    return sorted(rows)
 
 
-def _find_links(schedule: Schedule, links: Sequence[tuple[Name, Name]]) -> Iterator[list[int]]:
+def _find_links(schedule: Schedule, links: Collection[tuple[Name, Name]]) -> Iterator[tuple[int, int]]:
     for link in links:
         if len(link) != 2:
             raise InvalidSchedule(f"a link of {len(link)} members: name two")
-        yield _find_rows(schedule, link)
+        i, j = _find_rows(schedule, link)
+        yield i, j
 
 
 def _join_in_solid(path: TimedPath, contacts: list[tuple[float, float]], walls: Floats) -> list[tuple[float, float]]:

@@ -51,29 +51,50 @@ def broken_rules(ground: Ground, schedule: Schedule, times: Floats) -> set[str]:
 
     Walls are asked of the line through all places of a member, bodies of members that move only.
     """
-    environment = ground.environment
-    slack = FORGIVEN * environment.tolerance_m
     places = schedule.positions(times)
+    broken = broken_between(ground, schedule.radii_m, places)
+    if too_fast(ground, schedule):
+        broken.add("speed")
+    if any(hits_wall(ground, places[:, i], float(radius)) for i, radius in enumerate(schedule.radii_m)):
+        broken.add("wall")
+    return broken
+
+
+def too_fast(ground: Ground, schedule: Schedule) -> bool:
+    """Whether any piece of path asks for more than its member's speed."""
+    return any(
+        np.any(
+            np.hypot(*np.diff(path.waypoints, axis=0).T)
+            > limit * np.diff(path.times_s) * (1 + 1e-6) + FORGIVEN * ground.environment.tolerance_m
+        )
+        for path, limit in zip(schedule.paths, schedule.speeds_m_s, strict=True)
+    )
+
+
+def hits_wall(ground: Ground, places: Floats, radius: float) -> bool:
+    """Whether the line through places (n, 2) starts outside, or comes nearer to walls than the radius, if not 0."""
+    slack = FORGIVEN * ground.environment.tolerance_m
+    polygon = ground.environment.polygon
+    if shapely.distance(polygon, shapely.Point(places[0])) > slack:
+        return True
+    there = shapely.LineString(places[[0, *range(len(places))]])
+    return bool(radius > 0.0 and shapely.distance(polygon.boundary, there) < radius - slack)
+
+
+def broken_between(ground: Ground, radii: Floats, places: Floats) -> set[str]:
+    """Whether members at any of their places (n, k, 2) overlap, or are no network."""
+    slack = FORGIVEN * ground.environment.tolerance_m
     broken = set()
-    for path, limit in zip(schedule.paths, schedule.speeds_m_s, strict=True):
-        steps = np.hypot(*np.diff(path.waypoints, axis=0).T)
-        if np.any(steps > limit * np.diff(path.times_s) * (1 + 1e-6) + slack):
-            broken.add("speed")
-    for i, radius in enumerate(schedule.radii_m):
-        there = shapely.LineString(places[[0, *range(len(times))], i])
-        outside = shapely.distance(environment.polygon, shapely.Point(places[0, i])) > slack
-        if outside or (radius > 0.0 and shapely.distance(environment.polygon.boundary, there) < radius - slack):
-            broken.add("wall")
-    part = np.tile(np.arange(len(schedule)), (len(times), 1))
-    for i in range(len(schedule)):
+    part = np.tile(np.arange(len(radii)), (len(places), 1))
+    for i in range(len(radii)):
         for j in range(i):
-            if min(schedule.radii_m[[i, j]]) > 0.0:
-                near = schedule.radii_m[i] + schedule.radii_m[j] - slack
+            if min(radii[[i, j]]) > 0.0:
+                near = radii[i] + radii[j] - slack
                 if np.any(np.hypot(*(places[:, i] - places[:, j]).T) < near):
                     broken.add("collision")
             asked = np.flatnonzero(part[:, i] != part[:, j])
             sees = line_of_sight.segments_are_visible(
-                places[asked, i], places[asked, j], environment.walls, FORGIVEN / 2 * environment.tolerance_m
+                places[asked, i], places[asked, j], ground.environment.walls, 0.5 * slack
             )
             one, other = part[asked[sees], i, None], part[asked[sees], j, None]
             part[asked[sees]] = np.where(part[asked[sees]] == one, other, part[asked[sees]])
@@ -86,11 +107,8 @@ def sample_times(schedule: Schedule, step_s: float) -> Floats:
     return np.arange(schedule.start_s, schedule.end_s + step_s, step_s)
 
 
-def random_schedule(ground: Ground, robots: int, rng: np.random.Generator) -> Schedule | None:
-    """A base station and robots, all in one network at the start, who go to places near by; None where it fails.
-
-    Most keep the rules, by sampling coarsely. In some a robot stops at the very instant that it would lose sight.
-    """
+def random_team(ground: Ground, robots: int, rng: np.random.Generator) -> tuple[list[str], list[Floats]] | None:
+    """A base station and robots in one network, names and places; None where none was found."""
     members = ["base", *(f"robot_{i}" for i in range(robots))]
     places = [free_points(ground.free, 1, rng)[0]]
     while len(places) < len(members):
@@ -101,8 +119,20 @@ def random_schedule(ground: Ground, robots: int, rng: np.random.Generator) -> Sc
         if len(near) == 0:
             return None
         # Behind corners rather than in the open, so that the team is a chain more often than a crowd.
-        seen = [ground.environment.line_of_sight(point, np.array(places)).sum() for point in near]
+        seen = [np.sum(ground.environment.line_of_sight(point, np.array(places))) for point in near]
         places.append(near[int(np.argmin(seen))])
+    return members, places
+
+
+def random_schedule(ground: Ground, robots: int, rng: np.random.Generator) -> Schedule | None:
+    """A base station and robots, all in one network at the start, who go to places near by; None where it fails.
+
+    Most keep the rules, by sampling coarsely. In some a robot stops at the very instant that it would lose sight.
+    """
+    team = random_team(ground, robots, rng)
+    if team is None:
+        return None
+    members, places = team
     paths = [TimedPath.standing(place) for place in places]
     clock = 0.0
     for i in rng.permutation(np.arange(1, len(members))):

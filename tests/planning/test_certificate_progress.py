@@ -76,7 +76,7 @@ def test_who_can_part_is_named() -> None:
     assert certify(schedule, PILLAR, ends=("robot_0", "robot_1")).valid
     assert certify(schedule, PILLAR, ends=(1, 0), links=[("robot_0", 1)]).valid
     assert certify(schedule, PILLAR, links=[]).valid
-    assert certify(schedule, PILLAR, ends=(1, 2, 0)).violations[0].members == ("robot_1", "robot_2")
+    assert certify(schedule, PILLAR, ends={2, 1}).violations[0].members == ("robot_1", "robot_2")
     (violation,) = certify(schedule, PILLAR, links=[(2, 1), (0, 1)]).violations
     assert (violation.time_s, violation.stage) == (5.0, 1)
 
