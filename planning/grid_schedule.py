@@ -4,9 +4,8 @@ The grid of the coordination diagram is searched completely (`planning.diagram_s
 nothing there is no schedule on the grid. It grows exponentially with the number of robots: this is for a few of them,
 and for judging what scales better.
 
-A box is larger than the region in it. Of two robots that follow each other along a corridor it is all of the corridor,
-so that none may enter. So what lies in a box is judged once more, piece by piece: forbidden is only where robots can
-truly collide. If long pieces do not do, they are cut into shorter ones.
+Within boxes robots are judged piece by piece (`planning.diagram_pieces`). If long pieces do not do, they are cut into
+shorter ones.
 
 Where sight is asked for, paths are also cut at *critical points*, where a robot comes in sight of another that stands
 at one of its limits, or goes out of it (`planning.visible_interval`); and robots see each other on two pieces only if
@@ -25,18 +24,15 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from planning.coordination_diagram import OVERLAP, CoordinationDiagram, Pair, measure_path
+from planning.coordination_diagram import CoordinationDiagram, Pair, measure_path
+from planning.diagram_pieces import DiagramPieces
 from planning.diagram_schedule import Team, schedule_in
 from planning.environment import Environment
 from planning.motion_plan import Schedule
 from planning.no_schedule import NoSchedule
-from planning.pair_clearance import mark_clearance
-from planning.pair_sight import mark_sight
 from planning.visible_interval import visible_intervals
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 LONGEST_PIECES_M: Final = (np.inf, 1.0)
 """Tried one after the other."""
@@ -92,9 +88,8 @@ def grid_schedule(
     for longest_m in LONGEST_PIECES_M:
         cuts = [np.append(_divide(path, longest_m), at) for path, at in zip(points, critical, strict=True)]
         diagram = CoordinationDiagram.of(points, radius_m, cuts_m=cuts, anywhere=unscheduled)
-        pieces = _Pieces(diagram)
-        collides = {pair: pieces.find_collisions(pair, radius_m) for pair in diagram.collides}
-        diagram = replace(diagram, collides=collides)
+        pieces = DiagramPieces(diagram)
+        diagram = replace(diagram, collides=pieces.find_collisions(radius_m))
         if env is not None and pairs:
             diagram = diagram.with_sight({pair: pieces.find_sight(pair, env) for pair in pairs}, required, together)
         try:
@@ -137,50 +132,3 @@ def _find_critical_points(
                     shares = visible_intervals(env, path[leg : leg + 2], [post, post]).ravel()
                     found[mover] += [start + share * (end - start) for share in shares if 0.0 < share < 1.0]
     return [np.array(at) for at in found]
-
-
-class _Pieces:
-    """The pieces of all paths of a diagram whose limits hold all bends."""
-
-    def __init__(self, diagram: CoordinationDiagram) -> None:
-        self._diagram = diagram
-        self._nodes: list[Floats] = []
-        self._corners: list[Ints] = []
-        self._is_one: list[bool] = []
-        for robot, limits in enumerate(diagram.limits_m):
-            bends = measure_path(diagram.paths[robot])
-            # A robot that may be anywhere is on all pieces at once.
-            self._is_one.append(len(limits) == 1)
-            nodes = limits if len(limits) > 1 or bends[-1] == 0.0 else bends
-            self._nodes.append(diagram.places(robot, nodes))
-            self._corners.append(np.unique(np.searchsorted(0.5 * (nodes[1:] + nodes[:-1]), bends)))
-
-    def find_collisions(self, pair: Pair, radii_m: Floats) -> Bools:
-        """On which elements two robots could truly collide: (2 n_i − 1, 2 n_j − 1); within boxes only."""
-        boxed = self._diagram.collides[pair]
-        if not boxed.any():
-            return boxed
-        i, j = pair
-        table = self._make_table(pair)
-        separation = float(radii_m[i] + radii_m[j]) * (1.0 - OVERLAP)
-        mark_clearance(self._nodes[i], self._corners[i], self._nodes[j], self._corners[j], separation, table, 1)
-        return boxed & ~self._reduce(pair, table)
-
-    def find_sight(self, pair: Pair, env: Environment) -> Bools:
-        """Which elements of two robots see each other throughout: (2 n_i − 1, 2 n_j − 1)."""
-        i, j = pair
-        table = self._make_table(pair)
-        mark_sight(
-            self._nodes[i], self._corners[i], self._nodes[j], self._corners[j], env.walls, env.tolerance_m, table, 1
-        )
-        return self._reduce(pair, table)
-
-    def _make_table(self, pair: Pair) -> NDArray[np.uint8]:
-        rows, columns = (2 * len(self._nodes[robot]) - 1 for robot in pair)
-        return np.zeros((rows, columns), dtype=np.uint8)
-
-    def _reduce(self, pair: Pair, table: NDArray[np.uint8]) -> Bools:
-        for axis, robot in enumerate(pair):
-            if self._is_one[robot]:
-                table = table.min(axis=axis, keepdims=True)
-        return table.astype(np.bool_)
