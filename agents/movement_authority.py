@@ -15,9 +15,9 @@ Like a railway's movement authority: robots go no farther than has been released
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import islice, pairwise, takewhile
 
 from msgspec import structs
 
@@ -132,7 +132,8 @@ class MovementAuthority:
 
         Complexity: O(k n) for k members and n stages.
         """
-        soon = self.finished + sum(begin_s <= horizon_s for begin_s, _ in self._clock()) - 1
+        begun = sum(1 for _ in takewhile(lambda times_s: times_s[0] <= horizon_s, self._clock()))
+        soon = self.finished + begun - 1
         released = min(soon, self._settled if self.undecided else end_stage(self.motion) - 1)
         if released <= self.released:
             return False
@@ -142,7 +143,7 @@ class MovementAuthority:
     def lead_s(self) -> float:
         """What the released stages take at full speed, from the beginning of that which the slowest robot is in."""
         stages = self.released + 1 - self.finished
-        return self._clock()[stages - 1][1] if stages > 0 else 0.0
+        return max((end_s for _, end_s in islice(self._clock(), stages)), default=0.0)
 
     def onset(self) -> Onset:
         """Where a revision begins if nothing more is released before it is there."""
@@ -169,25 +170,25 @@ class MovementAuthority:
         first = min(max(self._finished[robot] - self.motion.first_stage, 0), end)
         return way.waypoints[way.stages[first] : way.stages[end] + 1]
 
-    def _clock(self) -> list[tuple[float, float]]:
+    def _clock(self) -> Iterator[tuple[float, float]]:
         """When each stage begins and ends at full speed, seconds from when that of the slowest robot begins.
 
         A stage begins when the first begins it that moves in it.
         """
         first = self.finished - self.motion.first_stage
         ready_s = [0.0] * len(self._takes_s)
-        clock: list[tuple[float, float]] = []
+        ended_s = before_s = 0.0
+        """When the last stage ends, and the one before it."""
         for stage in range(end_stage(self.motion) - self.finished):
-            earliest_s = clock[stage - 2][1] if stage > 1 else 0.0
-            begins_s = [max(time_s, earliest_s) for time_s in ready_s]
+            begins_s = [max(time_s, before_s) for time_s in ready_s]
             moving_s = [
                 begin_s for begin_s, own in zip(begins_s, self._takes_s, strict=True) if own[first + stage] > 0.0
             ]
             ready_s = [
                 begin_s + takes_s[first + stage] for begin_s, takes_s in zip(begins_s, self._takes_s, strict=True)
             ]
-            clock.append((min(moving_s or begins_s), max(ready_s)))
-        return clock
+            before_s, ended_s = ended_s, max(ready_s)
+            yield min(moving_s or begins_s), ended_s
 
 
 def _durations(way: MemberWay) -> list[float]:

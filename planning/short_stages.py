@@ -12,7 +12,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.continuation import assemble
 from planning.motion_plan import InvalidSchedule, Schedule, TimedPath
 
 Floats = NDArray[np.float64]
@@ -31,37 +30,34 @@ def shorten(schedule: Schedule, longest_s: float, growth: float = 0.0) -> Schedu
         InvalidSchedule: the schedule is bound to the clock.
         ValueError: ``longest_s`` is not positive, or ``growth`` negative.
 
-    Complexity: O(k (m + n)) for n stages of the result.
+    Complexity: O(k (m + n) log (m + n)) for n stages of the result.
     """
     if not longest_s > 0.0 or not growth >= 0.0:
         raise ValueError(f"stages of {longest_s} s, growing by {growth}: give a positive duration and growth from 0 on")
     if schedule.stages is None:
         raise InvalidSchedule("a schedule that is bound to the clock has no stages to shorten: give it stages")
     rows = [row for row, name in enumerate(schedule.members) if name not in schedule.unscheduled]
-    others = [row for row, name in enumerate(schedule.members) if name in schedule.unscheduled]
     ends_s = np.max([schedule.paths[row].times_s[schedule.stages[row, 1:]] for row in rows], axis=0, initial=-np.inf)
-    pieces: list[list[Floats]] = [[] for _ in rows]
     since_s = start_s = schedule.start_s
+    cuts: list[Floats] = []
     for until_s in np.unique(ends_s[ends_s > start_s]).tolist():
-        if since_s > start_s:
-            for own in pieces:
-                own.append(own[-1][-1:])
-        cuts = _cut(since_s - start_s, until_s - start_s, longest_s, growth) + start_s
-        cuts[0], cuts[-1] = since_s, until_s
-        for own, row in zip(pieces, rows, strict=True):
-            own += _excerpts(schedule.paths[row], cuts, own)
+        between = start_s + _cut(since_s - start_s, until_s - start_s, longest_s, growth)
+        between[0], between[-1] = since_s, until_s
+        cuts.append(between)
         since_s = until_s
-    if since_s == start_s:
+    if not cuts:
         return schedule
-    ranks = rows + others
-    return assemble(
-        [schedule.members[row] for row in rows],
-        pieces,
-        schedule.radii_m[ranks],
-        schedule.speeds_m_s[ranks],
-        start_s=start_s,
-        unscheduled={schedule.members[row]: schedule.paths[row] for row in others},
-    )
+    times_s = np.concatenate(cuts)
+    paths = list(schedule.paths)
+    stages = np.zeros((len(paths), len(times_s)), dtype=np.int64)
+    for row, path in enumerate(paths):
+        if row in rows:
+            all_s = np.union1d(path.times_s[path.times_s <= since_s], times_s)
+            paths[row] = TimedPath(path.positions(all_s), all_s)
+            stages[row] = np.searchsorted(all_s, times_s)
+        else:
+            stages[row, 1:] = len(path.waypoints) - 1
+    return Schedule(schedule.members, paths, schedule.radii_m, schedule.speeds_m_s, stages, schedule.unscheduled)
 
 
 def _cut(since_s: float, until_s: float, longest_s: float, growth: float) -> Floats:
@@ -75,16 +71,3 @@ def _cut(since_s: float, until_s: float, longest_s: float, growth: float) -> Flo
         cuts.append(cuts[-1] + max(longest_s, growth * cuts[-1]))
     # Shrunk to fit, which keeps their proportions.
     return since_s + (np.array(cuts) - since_s) * (whole_s / (cuts[-1] - since_s))
-
-
-def _excerpts(path: TimedPath, cuts: Floats, before: list[Floats]) -> list[Floats]:
-    """The waypoints of a path between each two cuts (n + 1,), n arrays (m, 2), from where ``before`` ends."""
-    places = path.positions(cuts)
-    if before:
-        places[0] = before[-1][-1]
-    inner = np.searchsorted(path.times_s, cuts, side="right")
-    outer = np.searchsorted(path.times_s, cuts, side="left")
-    return [
-        np.concatenate([places[n : n + 1], path.waypoints[inner[n] : outer[n + 1]], places[n + 1 : n + 2]])
-        for n in range(len(cuts) - 1)
-    ]
