@@ -193,7 +193,7 @@ class Robot:
             return
         before = self._follower.progress
         self._follower.accept(epoch, judged)
-        if before is None or before.plan != judged.plan:
+        if before is None or (before.epoch, before.plan) != (epoch, judged.plan):
             x, y = self._follower.target or position
             self._log("info", f"accepts plan {judged.plan}, and goes to ({x:.2f}, {y:.2f})")
 
