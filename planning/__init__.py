@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from planning.forecast import forecast_cells
     from planning.geodesic import GeodesicMap
     from planning.hybrid_schedule import adjacency_schedule, hybrid_schedule
+    from planning.motion import Motion, plan_motion
     from planning.motion_plan import Schedule, TimedPath
     from planning.mutual_visibility import mutual_visibility
     from planning.no_schedule import NoSchedule
@@ -56,6 +57,7 @@ __all__ = [
     "Environment",
     "GeodesicMap",
     "MostRelays",
+    "Motion",
     "NoSchedule",
     "PlacementGraph",
     "Redeployment",
@@ -84,6 +86,7 @@ __all__ = [
     "most_relays",
     "mutual_visibility",
     "physical_cost",
+    "plan_motion",
     "redeploy",
     "schedule",
     "shortest_path_deployment",
@@ -104,6 +107,7 @@ _HOMES = {
     "Environment": "planning.environment",
     "GeodesicMap": "planning.geodesic",
     "MostRelays": "planning.relays",
+    "Motion": "planning.motion",
     "NoSchedule": "planning.no_schedule",
     "PlacementGraph": "planning.placement_graph",
     "Redeployment": "planning.redeployment",
@@ -132,6 +136,7 @@ _HOMES = {
     "most_relays": "planning.relays",
     "mutual_visibility": "planning.mutual_visibility",
     "physical_cost": "planning.deployment_sequence",
+    "plan_motion": "planning.motion",
     "redeploy": "planning.redeployment",
     "schedule": "planning.schedule",
     "shortest_path_deployment": "planning.deployment",
