@@ -34,7 +34,7 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 Pair = tuple[int, int]
 
-OVERLAP: Final = 1e-9
+_OVERLAP: Final = 1e-9
 """Of the separation: by so much discs may overlap, for touching is no collision, and boxes are never too small."""
 
 _MERGED: Final = 1e-11
@@ -96,7 +96,7 @@ class CoordinationDiagram:
         cuts = [np.asarray(at, dtype=np.float64) for at in cuts_m or [()] * len(points)]
         cut = [_insert(path, at) for path, at in zip(points, cuts, strict=True)]
         boxes = {
-            (i, j): collision_boxes(cut[i], cut[j], (radii[i] + radii[j]) * (1.0 - OVERLAP))[0]
+            (i, j): collision_boxes(cut[i], cut[j], (radii[i] + radii[j]) * (1.0 - _OVERLAP))[0]
             for i, j in combinations(range(len(points)), 2)
             if min(radii[i], radii[j]) > 0.0 and not (i in anywhere and j in anywhere)
         }

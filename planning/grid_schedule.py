@@ -1,11 +1,11 @@
-"""The thesis' way of scheduling, with the bodies and the sight that there truly are: search on the grid of box limits.
+"""The thesis' way of scheduling, with the sight that there truly is: search on the grid of box limits.
 
 The grid of the coordination diagram is searched completely (`planning.diagram_search`), so if the search ends and finds
 nothing there is no schedule on the grid. It grows exponentially with the number of robots: this is for a few of them,
 and for judging what scales better.
 
-Within boxes robots are judged piece by piece (`planning.diagram_pieces`). If long pieces do not do, they are cut into
-shorter ones.
+A box is larger than the region in it. Of two robots that follow each other along a corridor it is all of the corridor,
+and the second waits until the first is out of it. So paths are cut into short pieces as well, whose boxes are small.
 
 Where sight is asked for, paths are also cut at *critical points*, where a robot comes in sight of another that stands
 at one of its limits, or goes out of it (`planning.visible_interval`); and robots see each other on two pieces only if
@@ -17,7 +17,6 @@ Thesis §4.3.2–4.3.3.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import replace
 from itertools import combinations
 from typing import Final
 
@@ -25,20 +24,25 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from planning.coordination_diagram import CoordinationDiagram, Pair, measure_path
-from planning.diagram_pieces import DiagramPieces
 from planning.diagram_schedule import Team, schedule_in
 from planning.environment import Environment
 from planning.motion_plan import Schedule
 from planning.no_schedule import NoSchedule
+from planning.pair_sight import mark_sight
 from planning.visible_interval import visible_intervals
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 LONGEST_PIECES_M: Final = (np.inf, 1.0)
-"""Tried one after the other."""
+"""Tried one after the other, unless nobody has to wait; the earlier end counts."""
 
 MOST_NODES: Final = 1_000_000
 """Successors, of the search with each length of pieces."""
+
+_NO_LATER: Final = 1e-9
+"""Of the time that the slowest robot needs: what rounding may add."""
 
 
 def grid_schedule(
@@ -84,20 +88,24 @@ def grid_schedule(
         bends = [measure_path(path) for path in points]
         coarse = CoordinationDiagram.of(points, radius_m, cuts_m=bends, anywhere=unscheduled)
         critical = _find_critical_points(coarse, env, pairs, bends)
-    refusal = None
+    fastest = max(float(measure_path(path)[-1]) / speed for path, speed in zip(points, speed_m_s, strict=True))
+    found: list[Schedule] = []
+    refusals: list[NoSchedule] = []
     for longest_m in LONGEST_PIECES_M:
         cuts = [np.append(_divide(path, longest_m), at) for path, at in zip(points, critical, strict=True)]
         diagram = CoordinationDiagram.of(points, radius_m, cuts_m=cuts, anywhere=unscheduled)
-        pieces = DiagramPieces(diagram)
-        diagram = replace(diagram, collides=pieces.find_collisions(radius_m))
         if env is not None and pairs:
-            diagram = diagram.with_sight({pair: pieces.find_sight(pair, env) for pair in pairs}, required, together)
+            seen = {pair: _find_sight(diagram, env, pair) for pair in pairs}
+            diagram = diagram.with_sight(seen, required, together)
         try:
-            return schedule_in(diagram, team, most_nodes)
-        except NoSchedule as error:
-            refusal = error
-    assert refusal is not None
-    raise refusal
+            found.append(schedule_in(diagram, team, most_nodes))
+        except NoSchedule as refusal:
+            refusals.append(refusal)
+        if found and found[-1].end_s <= fastest * (1.0 + _NO_LATER):
+            break
+    if not found:
+        raise refusals[-1]
+    return min(found, key=lambda schedule: schedule.end_s)
 
 
 def choose_demand(
@@ -132,3 +140,24 @@ def _find_critical_points(
                     shares = visible_intervals(env, path[leg : leg + 2], [post, post]).ravel()
                     found[mover] += [start + share * (end - start) for share in shares if 0.0 < share < 1.0]
     return [np.array(at) for at in found]
+
+
+def _find_sight(diagram: CoordinationDiagram, env: Environment, pair: Pair) -> Bools:
+    """Which elements of two robots i < j see each other throughout: (2 n_i − 1, 2 n_j − 1). All bends are limits."""
+    (nodes_i, corners_i), (nodes_j, corners_j) = (_list_nodes(diagram, robot) for robot in pair)
+    table = np.zeros((2 * len(nodes_i) - 1, 2 * len(nodes_j) - 1), dtype=np.uint8)
+    mark_sight(nodes_i, corners_i, nodes_j, corners_j, env.walls, env.tolerance_m, table, 1)
+    for axis, robot in enumerate(pair):
+        if len(diagram.limits_m[robot]) == 1:
+            table = np.minimum.reduce(table, axis=axis, keepdims=True)
+    return table.astype(np.bool_)
+
+
+def _list_nodes(diagram: CoordinationDiagram, robot: int) -> tuple[Floats, Ints]:
+    """Where a robot's limits are (n, 2), metres, and which of them are bends or ends.
+
+    One that may be anywhere has one limit, and all bends of its path are its nodes.
+    """
+    limits, bends = diagram.limits_m[robot], measure_path(diagram.paths[robot])
+    nodes = limits if len(limits) > 1 or bends[-1] == 0.0 else bends
+    return diagram.places(robot, nodes), np.unique(np.searchsorted(0.5 * (nodes[1:] + nodes[:-1]), bends))

@@ -8,15 +8,14 @@ holds from cell to cell; where topology changes on the way, with required links 
 The connection by any links needs no such choice: the cells that the team occupies must be a connected part of the
 mutual visibility graph at every instant. For adjacency paths that is the visibility chain of §4.3.4.
 
-Thesis §4.3.4–4.3.5, §4.3.3 for the search. Collisions are judged for both kinds of path: on the grid of box limits,
-but within boxes only where robots can truly collide (`planning.diagram_pieces`), lest robots that start side by side
-cannot start.
+Collisions are those of boxes, for both kinds of path: of the pieces, so they are smaller than those of whole segments.
+
+Thesis §4.3.4–4.3.5, and §4.3.3 for the search.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -26,7 +25,6 @@ from scipy.sparse import csr_array
 from planning.adjacency_path import AdjacencyPath
 from planning.coordination_diagram import CoordinationDiagram, Pair, measure_path, place_on_path, spread_pieces
 from planning.decomposition import Cells
-from planning.diagram_pieces import DiagramPieces
 from planning.diagram_schedule import Team, schedule_in
 from planning.grid_schedule import MOST_NODES, choose_demand
 from planning.motion_plan import Schedule
@@ -81,7 +79,6 @@ def hybrid_schedule(
     pairs = list(combinations(range(len(points)), 2)) if together else sorted(required)
     cuts = [cut_at_cells(path, cells) for path in points]
     diagram = CoordinationDiagram.of(points, radii, cuts_m=cuts, anywhere=unscheduled)
-    diagram = replace(diagram, collides=DiagramPieces(diagram).find_collisions(radii))
     occupied = [
         _find_cells(path, cut if robot in unscheduled else limits, cells)
         for robot, (path, cut, limits) in enumerate(zip(points, cuts, diagram.limits_m, strict=True))
