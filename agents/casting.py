@@ -78,7 +78,7 @@ class Casting:
         from agents.team_planner import TeamPlanner
 
         deployments = self.planner()
-        motions = MotionPlanner(self._mission, self._environment, deployments.graph.geodesics, self._judge)
+        motions = MotionPlanner(self._mission, self._environment, deployments.graph, self._judge)
         return TeamPlanner(deployments, motions, self._mission.agent_speed_m_s)
 
     def _build_planner(self) -> DeploymentPlanner:

@@ -28,16 +28,15 @@ from agents.mission import Mission
 from agents.motion_message import to_motion
 from agents.movement_authority import Onset
 from planning.foresight import walk
-from planning.motion_plan import Schedule
-from planning.no_schedule import NoSchedule
-from planning.schedule import schedule
+from planning.motion import Motion as TeamMotion
+from planning.motion import plan_motion
 from planning.short_stages import shorten
-from protocol.messages import Motion, Point
+from protocol.messages import MemberWay, Motion, Point
 
 if TYPE_CHECKING:
     from agents.certificate_judge import Judge
     from planning.environment import Environment
-    from planning.geodesic import GeodesicMap
+    from planning.placement_graph import PlacementGraph
 
 Floats = NDArray[np.float64]
 
@@ -46,6 +45,10 @@ FORESIGHT_S: Final = 1.0
 
 STAGE_S: Final = 0.25
 """Stages are cut to this duration, so that those released reach no farther than they must."""
+
+EFFORT: Final = 300
+LAST_EFFORT: Final = 2000
+"""Of searches for a motion that keeps sight, and for one that need not."""
 
 GROWTH: Final = 0.15
 """So much longer may stages be for each second that they are ahead."""
@@ -71,13 +74,14 @@ class MotionPlanner:
     Args:
         mission: roster, radius and speeds.
         environment: the map as drawn.
-        geodesics: shortest paths of the robots' centres.
+        placements: where robots can stop to let others pass, and their shortest paths.
         judge: certifies as the robots will.
     """
 
-    def __init__(self, mission: Mission, environment: Environment, geodesics: GeodesicMap, judge: Judge) -> None:
+    def __init__(self, mission: Mission, environment: Environment, placements: PlacementGraph, judge: Judge) -> None:
         self._mission, self._environment = mission, environment
-        self._geodesics, self._judge = geodesics, judge
+        self._placements, self._judge = placements, judge
+        self._geodesics = placements.geodesics
         self.base, self._agent = mission.base_station.name, mission.tracked_agent.name
 
     def plan(
@@ -100,73 +104,71 @@ class MotionPlanner:
 
         Complexity: that of a schedule, for each demand that cannot be met and the first that can.
         """
-        robots, mission = list(goals), self._mission
+        members = [self.base, *goals]
+        starts = [onset.places[name] for name in members]
+        ahead = _begin(way, FORESIGHT_S * self._mission.agent_speed_m_s)
         obstacles = {name: self._obstacle(way, onset) for name, way in lost.items()}
-        paths = {
-            self.base: np.array([onset.places[self.base]]),
-            **{name: self._path(onset.places[name], goals[name]) for name in robots},
-            self._agent: _begin(way, FORESIGHT_S * mission.agent_speed_m_s),
-            **obstacles,
-        }
-        bodies = {*robots, *obstacles}
         reason = ""
-        for joined in self._demands(robots, ends):
-            try:
-                found = schedule(
-                    list(paths.values()),
-                    [mission.robot_radius_m if name in bodies else 0.0 for name in paths],
-                    self._environment,
-                    joined=joined,
-                    members=list(paths),
-                    speed_m_s=[
-                        mission.agent_speed_m_s if name == self._agent else mission.robot_speed_m_s for name in paths
-                    ],
-                    unscheduled=[self._agent, *obstacles],
-                )
-            except NoSchedule as problem:
-                reason, best = reason or problem.text, problem.best
-            else:
-                return self._certify(onset, found, joined, goals, True, reason)
-        return self._certify(onset, best, frozenset(), goals, False, reason)
+        for joined in self._demands(members, ends):
+            found = plan_motion(
+                self._environment,
+                starts,
+                [onset.places[self.base], *goals.values()],
+                [0.0, *[self._mission.robot_radius_m] * len(goals)],
+                members=members,
+                speed_m_s=self._mission.robot_speed_m_s,
+                joined=joined,
+                unscheduled={self._agent: ahead} if self._agent in joined else None,
+                obstacles=[(where, self._mission.robot_radius_m) for where in obstacles.values()],
+                geodesics=self._geodesics,
+                placements=self._placements,
+                may_part=False,
+                effort=EFFORT if joined else LAST_EFFORT,
+            )
+            reason = reason or found.reason
+            if found.arrives:
+                break
+        return self._certify(onset, found, obstacles, goals, reason)
 
-    def _demands(self, robots: Sequence[str], ends: Sequence[str]) -> Iterator[frozenset[str]]:
+    def _demands(self, members: Sequence[str], ends: Sequence[str]) -> Iterator[frozenset[str]]:
         """What is asked of lines of sight, from strict to lax (see the module)."""
-        team = frozenset((self.base, *robots))
-        demands = [team | {self._agent}, team]
+        demands = [frozenset((*members, self._agent)), frozenset(members)]
         if ends:
             demands.append(frozenset((self.base, *ends)))
         yield from dict.fromkeys((*demands, frozenset[str]()))
 
     def _certify(
-        self,
-        onset: Onset,
-        found: Schedule,
-        joined: frozenset[str],
-        goals: Mapping[str, Point],
-        arrives: bool,
-        reason: str,
+        self, onset: Onset, found: TeamMotion, lost: Mapping[str, Floats], goals: Mapping[str, Point], reason: str
     ) -> Course:
         """The course, with the strictest of its demands that what is kept of the last motion meets too."""
-        motion = onset.continued(
-            to_motion(
-                shorten(found, STAGE_S, GROWTH), plan=0, revision=0, first_stage=0, released=-1, connection="none"
-            )
+        new = to_motion(
+            shorten(found.schedule, STAGE_S, GROWTH), plan=0, revision=0, first_stage=0, released=-1, connection="none"
         )
+        stages = len(new.ways[0].stages)
+        standing = (_standing_somewhere(name, way, self._mission.robot_radius_m, stages) for name, way in lost.items())
+        motion = onset.continued(structs.replace(new, ways=(*new.ways, *standing)))
+        joined = frozenset(found.connection)
         for demand in dict.fromkeys((joined, joined - {self._agent}, joined & _joined(onset.kept), frozenset[str]())):
             motion = _demand(motion, demand)
             fault = self._judge(motion)
             if not fault:
-                return Course(motion, goals, arrives, reason)
+                return Course(motion, goals, found.arrives, reason)
         raise ValueError(f"the motion planned is not certified: {fault}")
-
-    def _path(self, start: Point, goal: Point) -> Floats:
-        return np.array([start]) if start == goal else self._geodesics.path(start, goal)
 
     def _obstacle(self, way: Floats, onset: Onset) -> Floats:
         """Where a lost robot may be; if others stand there, only where it was heard last."""
         robots = [place for name, place in onset.places.items() if name != self.base]
         near = _distance(way, np.array(robots).reshape(-1, 2)) if robots else math.inf
         return way if near > 2 * self._mission.robot_radius_m else way[:1]
+
+
+def _standing_somewhere(name: str, way: Floats, radius_m: float, stages: int) -> MemberWay:
+    """A robot that stands anywhere on a way, in a motion of so many stages and one."""
+    waypoints = tuple((float(x), float(y)) for x, y in way)
+    return MemberWay(
+        member=name, radius_m=radius_m, speed_m_s=1.0, waypoints=waypoints,
+        stages=(0, *[len(waypoints) - 1] * (stages - 1)), scheduled=False,
+    )  # fmt: skip
 
 
 def _demand(motion: Motion, joined: frozenset[str]) -> Motion:

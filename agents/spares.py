@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.deployment import identify_robots
+from agents.assignment import assign
 from planning.foresight import length, walk
 from planning.geodesic import GeodesicMap
 from protocol.messages import Point
@@ -70,11 +70,7 @@ class Waiting:
         taken = [*relays[1:], *obstacles]
         names = list(spares)
         queue = self._queue(agent, relays, taken, len(names))
-        lengths = np.zeros((len(names), len(queue)))
-        for row, name in enumerate(names):
-            lengths[row] = self._geodesics.lengths(spares[name], queue)
-        # Squares, for on one way the plain sum is the same whoever overtakes.
-        chosen = [names[robot] for robot in identify_robots(lengths**2)]
+        chosen = assign(self._geodesics, spares, queue, before)
         waiting = {}
         for name, place in chain(
             zip(chosen, queue, strict=True),
