@@ -45,6 +45,30 @@ def _meets_hull(corners: Floats, ax: float, ay: float, bx: float, by: float) -> 
 
 
 @kernel
+def find_bounds(points: Floats, start: int, stop: int) -> tuple[float, float, float, float]:
+    """Least and greatest x, least and greatest y of the points (n, 2) from ``start`` to before ``stop``."""
+    left, low = right, high = points[start, 0], points[start, 1]
+    for k in range(start + 1, stop):
+        x, y = points[k, 0], points[k, 1]
+        left, right, low, high = min(left, x), max(right, x), min(low, y), max(high, y)
+    return left, right, low, high
+
+
+@kernel
+def _hull_is_free(corners: Floats, walls: Floats, near: Ints, count: int) -> bool:
+    """Whether the first ``count`` of the walls ``near`` keep clear of the hull of four corners (4, 2)."""
+    left, right, low, high = find_bounds(corners, 0, 4)
+    for n in range(count):
+        k = near[n]
+        ax, ay, bx, by = walls[k, 0, 0], walls[k, 0, 1], walls[k, 1, 0], walls[k, 1, 1]
+        if max(ax, bx) < left or min(ax, bx) > right or max(ay, by) < low or min(ay, by) > high:
+            continue
+        if _meets_hull(corners, ax, ay, bx, by):
+            return False
+    return True
+
+
+@kernel
 def see_throughout(p: Floats, q: Floats, walls: Floats) -> bool:
     """Whether every place on one way certainly sees every place on another.
 
@@ -55,8 +79,9 @@ def see_throughout(p: Floats, q: Floats, walls: Floats) -> bool:
 
     Complexity: O(w + m n v) for v walls near both ways.
     """
-    left, right = min(p[:, 0].min(), q[:, 0].min()), max(p[:, 0].max(), q[:, 0].max())
-    low, high = min(p[:, 1].min(), q[:, 1].min()), max(p[:, 1].max(), q[:, 1].max())
+    left, right, low, high = find_bounds(p, 0, p.shape[0])
+    start, stop, bottom, top = find_bounds(q, 0, q.shape[0])
+    left, right, low, high = min(left, start), max(right, stop), min(low, bottom), max(high, top)
     near = np.empty(walls.shape[0], np.int64)
     count = 0
     for k in range(walls.shape[0]):
@@ -66,15 +91,10 @@ def see_throughout(p: Floats, q: Floats, walls: Floats) -> bool:
             count += 1
     corners = np.empty((4, 2))
     for i in range(max(1, p.shape[0] - 1)):
-        corners[0], corners[1] = p[i], p[min(i + 1, p.shape[0] - 1)]
         for j in range(max(1, q.shape[0] - 1)):
-            corners[2], corners[3] = q[j], q[min(j + 1, q.shape[0] - 1)]
-            left, right = corners[:, 0].min(), corners[:, 0].max()
-            low, high = corners[:, 1].min(), corners[:, 1].max()
-            for k in near[:count]:
-                ax, ay, bx, by = walls[k, 0, 0], walls[k, 0, 1], walls[k, 1, 0], walls[k, 1, 1]
-                if max(ax, bx) < left or min(ax, bx) > right or max(ay, by) < low or min(ay, by) > high:
-                    continue
-                if _meets_hull(corners, ax, ay, bx, by):
-                    return False
+            for axis in range(2):
+                corners[0, axis], corners[1, axis] = p[i, axis], p[min(i + 1, p.shape[0] - 1), axis]
+                corners[2, axis], corners[3, axis] = q[j, axis], q[min(j + 1, q.shape[0] - 1), axis]
+            if not _hull_is_free(corners, walls, near, count):
+                return False
     return True

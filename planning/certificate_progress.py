@@ -14,13 +14,14 @@ progress too; then whatever happens on the nominal clock is one of these cases.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from planning.certificate_violation import Violation, name_parts
-from planning.certificate_window import find_distances, find_link, find_networks, time_stages
+from planning.certificate_window import bound_pieces, find_distances, find_link, find_networks, time_stages
 from planning.motion_plan import Schedule
 
 Floats = NDArray[np.float64]
@@ -29,6 +30,25 @@ Bools = NDArray[np.bool_]
 
 _SOONER: Final = 1e-9
 """Of a schedule's duration: what rounding may make a stage begin too soon."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Windows:
+    """The pieces of all members in every window, as rows of one list of points (see `planning.certificate_window`)."""
+
+    points: Floats
+    first: Ints
+    last: Ints
+    bounds: Floats
+    barriers: Floats
+    """(stages,) float, seconds: when all have finished each of them, on the nominal clock."""
+    start_s: float
+
+    def place(self, first: int, last: int) -> tuple[float, float, str]:
+        """From when to when a run of windows lasts, on the nominal clock, and the words for the first of them."""
+        begins = self.start_s if first == 0 else float(self.barriers[first - 1])
+        ends = float(self.barriers[last + 1]) if last + 2 < len(self.barriers) else np.inf
+        return begins, ends, f"stages {first} and {first + 1}" if len(self.barriers) > 1 else "stage 0"
 
 
 def check_progress(
@@ -44,20 +64,22 @@ def check_progress(
     """
     assert schedule.stages is not None
     points = np.concatenate([path.waypoints for path in schedule.paths])
-    lengths = [len(path.waypoints) for path in schedule.paths]
-    starts = np.cumsum([0, *lengths[:-1]])
+    times = np.concatenate([path.times_s for path in schedule.paths])
+    lengths = np.array([len(path.waypoints) for path in schedule.paths])
+    starts = np.cumsum(lengths) - lengths
     stages = schedule.stages + starts[:, None]
     waits = np.array([name not in schedule.unscheduled for name in schedule.members])
-    times = np.concatenate([path.times_s for path in schedule.paths])
-    begun, finished = time_stages(times, points, stages[waits], schedule.start_s)
-    # When all have finished each stage; an unscheduled member has nothing to finish.
-    barriers = finished.max(axis=0, initial=schedule.start_s)
+    begun, finished, barriers = time_stages(times, points, stages[waits], schedule.start_s)
     yield from _check_times(schedule, np.flatnonzero(waits), begun, finished, barriers)
     first, last = (stages[:, :-2], stages[:, 2:]) if schedule.stage_count > 1 else (stages[:, :1], stages[:, 1:])
     first = np.where(waits[:, None], first, starts[:, None])
     last = np.where(waits[:, None], last, (starts + lengths)[:, None] - 1)
-    yield from _check_collisions(schedule, points, first, last, depth, barriers)
-    yield from _check_connection(schedule, points, first, last, walls, required, ends, barriers)
+    bounds = bound_pieces(points, first, last)
+    windows = _Windows(points, first, last, bounds, barriers, schedule.start_s)
+    yield from _check_collisions(schedule, windows, depth)
+    yield from _check_links(schedule, windows, walls, required or ())
+    if required is None or ends is not None:
+        yield from _check_network(schedule, windows, walls, ends)
 
 
 def _check_times(
@@ -84,53 +106,42 @@ def _runs(broken: Bools) -> Iterator[tuple[int, int]]:
         yield int(first), int(after) - 1
 
 
-def _place_window(schedule: Schedule, barriers: Floats, first: int, last: int) -> tuple[float, float, str]:
-    """From when to when all can be in a run of windows, on the nominal clock, and the words for its first one."""
-    begins = schedule.start_s if first == 0 else float(barriers[first - 1])
-    ends = float(barriers[last + 1]) if last + 2 < schedule.stage_count else np.inf
-    return begins, ends, f"stages {first} and {first + 1}" if schedule.stage_count > 1 else "stage 0"
+def _check_collisions(schedule: Schedule, windows: _Windows, depth: float) -> Iterator[Violation]:
+    found = find_distances(windows.points, windows.first, windows.last, windows.bounds, schedule.radii_m)
+    separations = schedule.radii_m[:, None] + schedule.radii_m
+    near = found[..., 0] < separations[:, :, None] - depth
+    for i, j in np.argwhere(near.any(axis=2)):
+        one, other = schedule.members[i], schedule.members[j]
+        for window, until in _runs(near[i, j]):
+            begins, ends, where = windows.place(window, until)
+            _, x, y = found[i, j, window]
+            distance = f"nearer than {separations[i, j]:g} m to each other"
+            text = f"in {where} {one} and {other} can come {distance}, at ({x:.6g}, {y:.6g})"
+            yield Violation(begins, ends, "collision", (one, other), text, window)
 
 
-def _check_collisions(
-    schedule: Schedule, points: Floats, first: Ints, last: Ints, depth: float, barriers: Floats
-) -> Iterator[Violation]:
-    distances, places = find_distances(points, first, last, schedule.radii_m)
-    for i in range(len(schedule)):
-        for j in range(i):
-            separation = float(schedule.radii_m[i] + schedule.radii_m[j])
-            for window, until in _runs(distances[i, j] < separation - depth):
-                begins, ends, where = _place_window(schedule, barriers, window, until)
-                one, other = schedule.members[j], schedule.members[i]
-                x, y = places[i, j, window]
-                near = f"can come nearer than {separation:g} m to each other, at ({x:.6g}, {y:.6g})"
-                text = f"in {where} {one} and {other} {near}"
-                yield Violation(begins, ends, "collision", (one, other), text, window)
-
-
-def _check_connection(
-    schedule: Schedule,
-    points: Floats,
-    first: Ints,
-    last: Ints,
-    walls: Floats,
-    required: Sequence[tuple[int, int]] | None,
-    ends: Sequence[int] | None,
-    barriers: Floats,
+def _check_links(
+    schedule: Schedule, windows: _Windows, walls: Floats, required: Sequence[tuple[int, int]]
 ) -> Iterator[Violation]:
     names = schedule.members
-    for i, j in required or ():
-        held = find_link(points, first, last, i, j, walls)
+    for i, j in required:
+        held = find_link(windows.points, windows.first, windows.last, i, j, walls)
         for window, until in _runs(~held):
-            begins, finishes, where = _place_window(schedule, barriers, window, until)
+            begins, finishes, where = windows.place(window, until)
             text = f"in {where} {names[i]} and {names[j]} do not see each other from everywhere on their ways"
             yield Violation(begins, finishes, "connection", (names[i], names[j]), text, window)
-    if required is not None and ends is None:
-        return
-    asked = np.arange(len(schedule)) if ends is None else np.array(ends)
-    labels, links = find_networks(points, first, last, asked, walls)
+
+
+def _check_network(
+    schedule: Schedule, windows: _Windows, walls: Floats, ends: Sequence[int] | None
+) -> Iterator[Violation]:
+    names = schedule.members
+    asked = np.array(range(len(schedule)) if ends is None else ends)
+    pairs = _order_pairs(windows.bounds)
+    labels, links = find_networks(windows.points, windows.first, windows.last, pairs, asked, walls)
     broken = np.any(labels[:, asked] != labels[:, asked[:1]], axis=1)
     for window, until in _runs(broken):
-        begins, finishes, where = _place_window(schedule, barriers, window, until)
+        begins, finishes, where = windows.place(window, until)
         label = np.unique(labels[window], return_inverse=True)[1]
         before = links[window - 1] if window > 0 else links[:0, 0]
         lost = [(int(i), int(j)) for i, j in before if i >= 0 and label[i] != label[j]]
@@ -140,3 +151,11 @@ def _check_connection(
         i, j = lost[0] if lost and ends is None else apart
         text = f"in {where}{why} the team can be parted: {parts}"
         yield Violation(begins, finishes, "connection", (names[i], names[j]), text, window)
+
+
+def _order_pairs(bounds: Floats) -> Ints:
+    """All pairs of members in each window, (w, n, 2), those first whose pieces are near each other."""
+    pairs = np.column_stack(np.triu_indices(len(bounds), 1))
+    middles = bounds[..., ::2] + bounds[..., 1::2]
+    spans = np.linalg.norm(middles[pairs[:, 0]] - middles[pairs[:, 1]], axis=-1)
+    return pairs[np.argsort(spans, axis=0).T]

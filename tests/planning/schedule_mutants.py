@@ -81,8 +81,11 @@ def hits_wall(ground: Ground, places: Floats, radius: float) -> bool:
     return bool(radius > 0.0 and shapely.distance(polygon.boundary, there) < radius - slack)
 
 
-def broken_between(ground: Ground, radii: Floats, places: Floats) -> set[str]:
-    """Whether members at any of their places (n, k, 2) overlap, or are no network."""
+def broken_between(ground: Ground, radii: Floats, places: Floats, dip: float = 0.5 * FORGIVEN) -> set[str]:
+    """Whether members at any of their places (n, k, 2) overlap, or are no network.
+
+    ``dip``: how far lines of sight may be in walls, in tolerances.
+    """
     slack = FORGIVEN * ground.environment.tolerance_m
     broken = set()
     part = np.tile(np.arange(len(radii)), (len(places), 1))
@@ -94,7 +97,7 @@ def broken_between(ground: Ground, radii: Floats, places: Floats) -> set[str]:
                     broken.add("collision")
             asked = np.flatnonzero(part[:, i] != part[:, j])
             sees = line_of_sight.segments_are_visible(
-                places[asked, i], places[asked, j], ground.environment.walls, 0.5 * slack
+                places[asked, i], places[asked, j], ground.environment.walls, dip * ground.environment.tolerance_m
             )
             one, other = part[asked[sees], i, None], part[asked[sees], j, None]
             part[asked[sees]] = np.where(part[asked[sees]] == one, other, part[asked[sees]])

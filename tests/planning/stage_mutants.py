@@ -34,6 +34,9 @@ Floats = NDArray[np.float64]
 Legs = list[list[Floats]]
 """For each member its way in each stage, (m, 2) float, metres; of an unscheduled one all of it in the first."""
 
+DIP = 20.0
+"""Tolerances: the most that sharp corners recede for the certificate. Schedules here are at its limit, not near it."""
+
 KINDS = ("sooner", "swap", "merge", "drop", "exchange", "border", "waypoint", "hair", "clock", "unscheduled")
 
 
@@ -47,7 +50,7 @@ def random_staged(ground: Ground, robots: int, rng: np.random.Generator) -> Sche
         return None
     members, places = team
     radii = np.array([0.0] + [ground.radius_m] * robots)
-    made = assemble(members, [[place[None]] for place in places], radii, SPEED)
+    made = Schedule(members, [TimedPath.standing(place) for place in places], radii, SPEED, [[0, 0]] * len(members))
     for _ in range(3 * robots):
         i = int(rng.integers(1, len(members)))
         place = read_legs(made)[i][-1][-1]
@@ -251,7 +254,7 @@ def breaks_the_rule(ground: Ground, schedule: Schedule) -> set[str]:
     if _hurries(schedule, slack):
         broken.add("progress")
     # As deep at corners as the certificate's walls recede.
-    space = environment.polygon.buffer(0.5 * slack, join_style="mitre", mitre_limit=20.0)
+    space = environment.polygon.buffer(0.5 * slack, join_style="mitre", mitre_limit=DIP)
     shapely.prepare(space)
     for n in range(max(1, schedule.stage_count - 1)):
         ways = [schedule.piece(i, n, min(n + 1, schedule.stage_count - 1)) for i in range(len(schedule))]
@@ -296,7 +299,7 @@ def breaks_by_turns(ground: Ground, schedule: Schedule, rng: np.random.Generator
     """What is seen at every millimetre while members go by turns, at random, as the rule of progress allows."""
     by_turns = _go_by_turns(schedule, rng)
     places = by_turns.positions(sample_times(by_turns, 1e-3 / SPEED))
-    return broken_between(ground, schedule.radii_m, places)
+    return broken_between(ground, schedule.radii_m, places, DIP)
 
 
 def _go_by_turns(schedule: Schedule, rng: np.random.Generator) -> Schedule:
