@@ -65,21 +65,12 @@ def schedule_in(diagram: CoordinationDiagram, team: Team, most_nodes: int) -> Sc
         NoSchedule: there is none on the grid of the diagram (then that is ``proven``), or the search was given up.
     """
     start = np.zeros(len(diagram), dtype=np.int64)
-    goal = np.array([2 * len(limits) - 2 for limits in diagram.limits_m], dtype=np.int64)
     if (wrong := _find_trouble(diagram, team, start)) is not None:
         text, between = wrong
-        best = _execute(diagram, team, start[None])
-        raise NoSchedule(f"no schedule starts where {text}", best, between, proven=True)
+        raise NoSchedule(f"no schedule starts where {text}", _execute(diagram, team, start[None]), between, proven=True)
     reachable, parted = _trim(diagram)
-    wrong = _find_trouble(diagram, team, goal)
-    if wrong is not None:
-        wrong = f"no schedule ends where {wrong[0]}", wrong[1]
-    elif parted is not None:
-        one, other = (team.members[robot] for robot in parted)
-        text = f"{one} and {other} alone cannot both get to the ends of their paths on the grid of {_size(diagram)}"
-        wrong = text, (one, other)
-    if wrong is not None:
-        text, between = wrong
+    if (known := _refuse_at_once(diagram, team, parted)) is not None:
+        text, between = known
         route = search_diagram(reachable, team.speeds_m_s, most_nodes // _TRY, _HASTE)
         raise NoSchedule(text, _execute(diagram, team, route.turns), between, proven=True)
     for haste in (0.0, _HASTE):
@@ -91,6 +82,20 @@ def schedule_in(diagram: CoordinationDiagram, team: Team, most_nodes: int) -> Sc
         return found
     text, blamed = _blame(diagram, team, route)
     raise NoSchedule(text, found, blamed, proven=route.exhausted)
+
+
+def _refuse_at_once(
+    diagram: CoordinationDiagram, team: Team, parted: Pair | None
+) -> tuple[str, tuple[str, str]] | None:
+    """Why no search can get to the end, in words, and between whom; None if it may."""
+    goal = np.array([2 * len(limits) - 2 for limits in diagram.limits_m], dtype=np.int64)
+    if (wrong := _find_trouble(diagram, team, goal)) is not None:
+        return f"no schedule ends where {wrong[0]}", wrong[1]
+    if parted is None:
+        return None
+    one, other = (team.members[robot] for robot in parted)
+    text = f"{one} and {other} alone cannot both get to the ends of their paths on the grid of {_size(diagram)}"
+    return text, (one, other)
 
 
 def _find_trouble(diagram: CoordinationDiagram, team: Team, elements: Ints) -> tuple[str, tuple[str, str]] | None:

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from planning.coordination_diagram import CoordinationDiagram
+from planning.diagram_lines import admits, line_is_free, measure_left, span
 from planning.kernel import kernel
 
 Floats = NDArray[np.float64]
@@ -38,9 +39,6 @@ _GAVE_UP: Final = 2
 _SAME: Final = 1e-6
 """Of the time that the slowest needs at least: costs nearer to each other than this are equal, and the point that is
 nearer to the goal goes first."""
-
-_AT_ONCE: Final = 1e-12
-"""Of a line: robots that reach limits so shortly after each other reach them together."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,89 +95,6 @@ def search_diagram(diagram: CoordinationDiagram, speeds_m_s: ArrayLike, most_nod
         haste / k,
     )
     return Route(turns, status == _FOUND, status == _EXHAUSTED)
-
-
-@kernel
-def _admits(elements: Ints, sizes: Ints, starts: Ints, blocked: Bools, seen: Bools, joined: Bools, part: Ints) -> bool:
-    """Whether robots may be in these elements (k,) together; ``part`` (k,) is scratch."""
-    k = elements.shape[0]
-    for i in range(k):
-        for j in range(i + 1, k):
-            if blocked[starts[i, j] + elements[i] * sizes[j] + elements[j]]:
-                return False
-    if seen.shape[0] == 0:
-        return True
-    for i in range(k):
-        part[i] = i
-    for i in range(k):
-        for j in range(i + 1, k):
-            if part[i] != part[j] and seen[starts[i, j] + elements[i] * sizes[j] + elements[j]]:
-                mine, other = part[i], part[j]
-                for m in range(k):
-                    if part[m] == other:
-                        part[m] = mine
-    first = -1
-    for i in range(k):
-        if joined[i]:
-            if first >= 0 and part[i] != first:
-                return False
-            first = part[i]
-    return True
-
-
-@kernel
-def _line_is_free(
-    a: Ints, b: Ints, limits: Floats, firsts: Ints, sizes: Ints, starts: Ints, blocked: Bools, seen: Bools,
-    joined: Bools, elements: Ints, part: Ints,
-) -> bool:  # fmt: skip
-    """Whether all robots may go evenly from their limits ``a`` (k,) to ``b``; the last two are scratch.
-
-    Between two limits that any robot crosses the elements stay the same. At a limit itself they border those before
-    and after it, and are allowed as these are.
-    """
-    k = a.shape[0]
-    way = np.empty(k, np.int64)
-    for i in range(k):
-        way[i] = 1 if b[i] > a[i] else -1 if b[i] < a[i] else 0
-        elements[i] = 2 * a[i] + way[i]
-    while True:
-        if not _admits(elements, sizes, starts, blocked, seen, joined, part):
-            return False
-        # The share of the line after which the next robots reach a limit; those of one share do at once.
-        following = 1.0
-        for i in range(k):
-            if way[i] != 0:
-                following = min(following, _share(i, a[i], b[i], elements[i] + way[i], limits, firsts))
-        if following >= 1.0 - _AT_ONCE:
-            return True
-        for i in range(k):
-            if way[i] != 0 and _share(i, a[i], b[i], elements[i] + way[i], limits, firsts) <= following + _AT_ONCE:
-                elements[i] += 2 * way[i]
-
-
-@kernel
-def _share(i: int, start: int, end: int, element: int, limits: Floats, firsts: Ints) -> float:
-    """How far the limit that an even element stands for is on robot i's way from one limit to another, 0 to 1."""
-    first = limits[firsts[i] + start]
-    return float((limits[firsts[i] + element // 2] - first) / (limits[firsts[i] + end] - first))
-
-
-@kernel
-def _span(a: Ints, b: Ints, limits: Floats, firsts: Ints, pace: Floats) -> float:
-    """Seconds that the slowest robot takes from its limit in ``a`` (k,) to that in ``b``."""
-    longest = 0.0
-    for i in range(a.shape[0]):
-        longest = max(longest, abs(limits[firsts[i] + b[i]] - limits[firsts[i] + a[i]]) * pace[i])
-    return longest
-
-
-@kernel
-def _measure_left(a: Ints, limits: Floats, firsts: Ints, pace: Floats) -> float:
-    """Seconds that all robots together have left from their limits in ``a`` (k,)."""
-    total = 0.0
-    for i in range(a.shape[0]):
-        total += (limits[firsts[i + 1] - 1] - limits[firsts[i] + a[i]]) * pace[i]
-    return total
 
 
 @kernel
@@ -271,8 +186,8 @@ def _search(
     slots = np.full(1024, -1)
     slots[_find_slot(points[0], points, slots)] = 0
     known, successors = 1, 0
-    unit = _SAME * _span(points[0], last, limits, firsts, pace) + 1e-300
-    nearest, least_left = 0, _measure_left(points[0], limits, firsts, pace)
+    unit = _SAME * span(points[0], last, limits, firsts, pace) + 1e-300
+    nearest, least_left = 0, measure_left(points[0], limits, firsts, pace)
     waiting = [(0, least_left, 0)]
     status = _EXHAUSTED
     while len(waiting) > 0:
@@ -289,7 +204,6 @@ def _search(
             nearest, status = point, _FOUND
             break
         if successors > most:
-            status = _GAVE_UP
             break
         for move in range(1, (1 << going) + k):
             successors += 1
@@ -301,7 +215,7 @@ def _search(
             target = slots[slot]
             if target >= 0 and done[target]:
                 continue
-            if not _admits(elements, sizes, starts, blocked, seen, joined, part):
+            if not admits(elements, sizes, starts, blocked, seen, joined, part):
                 continue
             if target < 0:
                 if known == len(points):
@@ -314,17 +228,19 @@ def _search(
                     points[target, i] = following[i]
                 costs[target] = np.inf
             turn = turned_at[point]
-            cost = costs[turn] + _span(points[turn], following, limits, firsts, pace)
-            if cost < costs[target] and not _line_is_free(
+            cost = costs[turn] + span(points[turn], following, limits, firsts, pace)
+            if cost < costs[target] and not line_is_free(
                 points[turn], following, limits, firsts, sizes, starts, blocked, seen, joined, on_line, part
             ):
                 turn = point
-                cost = costs[point] + _span(points[point], following, limits, firsts, pace)
+                cost = costs[point] + span(points[point], following, limits, firsts, pace)
             if cost < costs[target]:
                 costs[target], turned_at[target] = cost, turn
-                left = _measure_left(following, limits, firsts, pace)
-                expected = cost + _span(following, last, limits, firsts, pace) + haste * left
+                left = measure_left(following, limits, firsts, pace)
+                expected = cost + span(following, last, limits, firsts, pace) + haste * left
                 heappush(waiting, (int(expected / unit), left, target))
+    if status != _FOUND and successors > most:
+        status = _GAVE_UP
     turns = 1
     point = nearest
     while point != 0:

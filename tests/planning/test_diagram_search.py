@@ -163,6 +163,16 @@ def test_a_search_that_is_given_up_says_so_and_how_far_it_got(most_nodes: int) -
     check(diagram, np.ones(4), route)
 
 
+def test_a_search_that_was_cut_short_has_proven_nothing() -> None:
+    blocked = np.zeros((2, 2), dtype=np.bool_)
+    blocked[0, 1] = blocked[1, 0] = blocked[0, 0] = True
+    limits = (np.arange(3.0), np.arange(3.0))
+    paths = (np.array([(0.0, 0.0), (2.0, 0.0)]), np.array([(0.0, 1.0), (2.0, 1.0)]))
+    diagram = CoordinationDiagram(paths, limits, {(0, 1): spread_pieces(blocked, 3, 3)}, {}, frozenset(), ())
+    assert not search_diagram(diagram, np.ones(2), 1).exhausted
+    assert search_diagram(diagram, np.ones(2), 100).exhausted
+
+
 def test_one_robot_and_robots_that_stand() -> None:
     alone = CoordinationDiagram.of([[(0, 0), (3, 0), (3, 4)]], [0.2])
     assert search_diagram(alone, [1.0], 100).turns.tolist() == [[0], [1]]
