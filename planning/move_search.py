@@ -36,6 +36,9 @@ Bytes = NDArray[np.int8]
 GREED: Final = 3.0
 """What a metre that is left counts more than a metre gone."""
 
+ASIDE: Final = 0.25
+"""What a metre that is left counts for one who only steps aside, and comes back."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Crew:
@@ -84,8 +87,10 @@ def search_moves(roadmap: TeamRoadmap, crew: Crew, goals: Ints, effort: int, gre
     """
     m = len(goals)
     to_go = roadmap.lengths_to(goals.tolist())
+    starts = crew.at[:m]
     # Whoever cannot get there at all may be anywhere.
-    to_go[np.isinf(to_go[np.arange(m), crew.at[:m]])] = 0.0
+    to_go[np.isinf(to_go[np.arange(m), starts])] = 0.0
+    to_go[goals == starts] *= ASIDE
     watched = [roadmap.watch_path(path) for path in crew.paths]
     path_sees = np.array([by_place for by_place, _ in watched], dtype=np.bool_).reshape(-1, len(roadmap.places))
     path_watches = np.array([by_edge for _, by_edge in watched], dtype=np.bool_).reshape(-1, len(roadmap.edges))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,10 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
+CROWDED: Final = 1.0
+"""Places around discs are no nearer to others than this share of a mover's radius."""
+
+
 class Steps:
     """The moves of one team on one roadmap.
 
@@ -42,20 +46,29 @@ class Steps:
         self._task, self.movers = task, list(movers)
         self._rows = [*movers, *(row for row in range(len(task.members)) if row not in movers)]
         common = _join_placements(task.environment, task.geodesics, placements, float(task.radii_m[self.movers].max()))
-        rings = [
-            ring(place, float(task.radii_m[self.movers].max() + task.radii_m[i]), task.free)
-            for i in self._rows
-            for place in (task.starts[i], task.goals[i])
-            if task.radii_m[i] > 0.0
-        ]
-        added = [task.starts[self._rows], task.goals[self.movers], *rings]
-        self.roadmap: TeamRoadmap = extend_roadmap(common, task.free, np.concatenate(added))
+        coming = [row for row in movers if np.any(task.starts[row] != task.goals[row])]
+        ends = np.concatenate([task.starts[self._rows], task.goals[coming]])
+        self.roadmap: TeamRoadmap = extend_roadmap(common, task.free, np.concatenate([ends, self._rings(ends)]))
         first = len(common.places)
         self.starts: Ints = first + np.arange(len(movers))
         """(m,) int: where the movers are, on the roadmap."""
-        self.goals: Ints = first + len(self._rows) + np.arange(len(movers))
+        self.goals: Ints = self.starts.copy()
         """(m,) int: where they go."""
+        self.goals[np.isin(movers, coming)] = first + len(self._rows) + np.arange(len(coming))
         self._standing: Ints = first + np.arange(len(movers), len(self._rows))
+
+    def _rings(self, kept: Floats) -> Floats:
+        """Places (n, 2) around all discs at their starts and goals, none near to another or to those kept."""
+        task = self._task
+        widest = float(task.radii_m[self.movers].max())
+        near = task.environment.tolerance_m + CROWDED * widest
+        first = len(kept)
+        for i in self._rows:
+            for place in (task.starts[i], task.goals[i]) if task.radii_m[i] > 0.0 else ():
+                for spot in ring(place, widest + float(task.radii_m[i]), task.free):
+                    if np.hypot(*(kept - spot).T).min() > near:
+                        kept = np.concatenate([kept, spot[None]])
+        return kept[first:]
 
     def search(self, start: Ints, goal: Ints, level: Level, effort: int) -> Moves:
         """Moves from one deployment of the movers to another, both (m,) int."""
