@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from typing import Final
 
 import numpy as np
@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from planning.motion_plan import InvalidSchedule, Schedule, TimedPath
 
 Floats = NDArray[np.float64]
+Places = list[list[float]]
 
 _SAME_PLACE_M: Final = 1e-9
 """Between where one schedule ends and where the next one starts."""
@@ -65,7 +66,7 @@ def assemble(
         )
     for name, own, speed in zip(members, ways, speeds, strict=False):
         _check_way(name, own, float(speed))
-    lengths = np.array([[np.hypot(*np.diff(piece, axis=0).T).sum() for piece in own] for own in ways])
+    lengths = np.array([[math.fsum(math.dist(p, q) for p, q in pairwise(piece)) for piece in own] for own in ways])
     moves = lengths > 0.0
     takes = np.divide(lengths, speeds[: len(ways), None], out=np.zeros_like(lengths), where=moves)
     begins, ends = _earliest(takes, start_s)
@@ -143,21 +144,20 @@ def follow(first: Schedule, second: Schedule) -> Schedule:
     )
 
 
-def _thin(piece: ArrayLike) -> Floats:
+def _thin(piece: ArrayLike) -> Places:
     """Without stops: a stop is what waiting makes of a path, and times are made anew."""
-    points = np.array(piece, dtype=np.float64).reshape(-1, 2)
-    if len(points) == 0:
+    points: Places = np.array(piece, dtype=np.float64).reshape(-1, 2).tolist()
+    if not points:
         raise InvalidSchedule("a piece of path has no points: give the place where the member stands")
-    thinned: Floats = points[np.append(True, np.any(np.diff(points, axis=0) != 0.0, axis=1))]
-    return thinned
+    return points[:1] + [after for before, after in pairwise(points) if before != after]
 
 
-def _check_way(name: str, own: list[Floats], speed: float) -> None:
+def _check_way(name: str, own: list[Places], speed: float) -> None:
     for n, (before, after) in enumerate(pairwise(own)):
-        if not np.array_equal(before[-1], after[0]):
+        if before[-1] != after[0]:
             raise InvalidSchedule(
-                f"{name} ends stage {n} at {tuple(before[-1].tolist())} and begins the next at "
-                f"{tuple(after[0].tolist())}: begin where it is"
+                f"{name} ends stage {n} at {tuple(before[-1])} and begins the next at {tuple(after[0])}: "
+                "begin where it is"
             )
     if any(len(piece) > 1 for piece in own) and not (0.0 < speed < np.inf):
         raise InvalidSchedule(f"{name} is to move at {speed:g} m/s: give a finite speed above 0")
@@ -174,19 +174,19 @@ def _earliest(takes: Floats, start_s: float) -> tuple[Floats, Floats]:
     return begins, ends
 
 
-def _lay(own: list[Floats], begins: Floats, ends: Floats, speed: float, start_s: float) -> tuple[TimedPath, list[int]]:
+def _lay(own: list[Places], begins: Floats, ends: Floats, speed: float, start_s: float) -> tuple[TimedPath, list[int]]:
     """A member's path at the times of its stages, and the waypoints at which these begin and the last one ends."""
     points, times, row = [own[0][0]], [start_s], [0]
-    for piece, begin, end in zip(own, begins, ends, strict=True):
+    for piece, begin, end in zip(own, begins.tolist(), ends.tolist(), strict=True):
         if len(piece) > 1:
             if begin > times[-1]:
                 points.append(piece[0])
-                times.append(float(begin))
-            covered = np.cumsum(np.hypot(*np.diff(piece, axis=0).T))
-            points += list(piece[1:])
-            for time in (*(begin + covered[:-1] / speed), end):
+                times.append(begin)
+            points += piece[1:]
+            covered = list(accumulate(math.dist(p, q) for p, q in pairwise(piece)))
+            for time in (*(begin + length / speed for length in covered[:-1]), end):
                 # Steps so short that rounding swallows their time take the least time that there is.
-                times.append(max(float(time), math.nextafter(times[-1], math.inf)))
+                times.append(max(time, math.nextafter(times[-1], math.inf)))
         row.append(len(points) - 1)
     return TimedPath(points, times), row
 
