@@ -3,10 +3,17 @@
 A state is the node that each member is at. In a *step* some members go on by one piece, the *movers*; the others stay
 at their nodes. A step is allowed if all combinations of places on the way are in order: robots apart, and the team
 connected by links that hold throughout. What several may do together each of them may do alone, in any order; so
-steps of one mover are enough to find whatever can be found, and steps of many make it fast and the schedule short.
+steps of one mover are enough to find whatever can be found.
 
-The search goes depth first, each state once: from every state first as many together as can, those first that have
-longest to go; where that ends nowhere, one by one.
+First all go on together, in every step as many as can, those first that have longest to go: that is mostly all, and
+short. Where it ends nowhere, a search goes depth first, each state once, and needs few of the many orders:
+
+- No pair of members goes where the two have no way on (`planning.pair_prospects`).
+- A piece that is in nobody's way is driven at once, and nothing else is tried instead (`planning.pair_conflicts`).
+- Where only collisions count, members that have nothing more to do with each other are searched one group after the
+  other: an order among groups changes nothing.
+
+What the search finds is one after the other; then every move is made as early as it can be.
 """
 
 from __future__ import annotations
@@ -17,6 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.kernel import kernel
+from planning.pair_conflicts import find_cluster, find_last_ahead, find_last_conflicts, move_freely
+from planning.pair_prospects import OPEN, mark_prospects
 from planning.pair_tables import APART, SEES, PairTables
 
 Floats = NDArray[np.float64]
@@ -36,31 +45,49 @@ class Demand:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Order:
-    """The states (n + 1, k) that the members go through, node by node, and whether they get to their goals."""
+    """What a search found.
+
+    Attributes:
+        states: (n + 1, k) int: the nodes that the members go through; to their last ones, or to the state found with
+            the least left to go.
+        complete: whether they are at their last nodes in the end.
+        proven: where not, whether no order is.
+        closed: (m, 2) int: pairs of members that have no way to their last nodes even without the others.
+    """
 
     states: Ints
     complete: bool
+    proven: bool
+    closed: Ints
 
 
 def search_order(tables: PairTables, demand: Demand, durations: Floats, last: Ints, most_states: int) -> Order:
     """Find steps that bring all members from their first nodes to their last ones.
 
     Args:
-        tables: of all pairs.
+        tables: of all pairs; the bits for prospects are set.
         demand: what has to be connected at any time.
         durations: (k, n) float, seconds: how long each member takes for each of its pieces; 0 beyond its last.
         last: (k,) int: each member's last node; 0 for one that stands, or is anywhere on its path.
-        most_states: give up after so many.
+        most_states: of the depth-first search; then it gives up.
 
-    Returns:
-        The order; if none was found, that to the state with the least left to go.
+    Complexity: O(k² n²) for n elements each; each step or state O(k²).
     """
+    bits, starts, sizes = tables.bits, tables.starts, tables.sizes
     remaining = np.zeros((len(durations), durations.shape[1] + 1))
     remaining[:, :-1] = np.cumsum(durations[:, ::-1], axis=1)[:, ::-1]
-    states, complete = _search(
-        tables.bits, tables.starts, tables.sizes, demand.joined, demand.links, remaining, last, most_states
-    )
-    return Order(states, bool(complete))
+    closed = mark_prospects(bits, starts, sizes, last, demand.joined, demand.links)
+    for i, j in (*closed, *closed[:, ::-1]):
+        tables.table(i, j)[...] |= OPEN
+    states = _go_together(bits, starts, sizes, demand.joined, demand.links, remaining, last)
+    if np.array_equal(states[-1], last):
+        return Order(states, True, False, closed)
+    found, exhausted = _search(bits, starts, sizes, demand.joined, demand.links, remaining, last, most_states)
+    complete = np.array_equal(found[-1], last)
+    rows = np.arange(len(last))
+    if complete or remaining[rows, found[-1]].sum() < remaining[rows, states[-1]].sum():
+        states = _hasten(found, bits, starts, sizes, demand.joined, demand.links)
+    return Order(states, complete, not complete and bool(exhausted or len(closed) > 0), closed)
 
 
 @kernel
@@ -81,32 +108,28 @@ def is_joined(adjacent: Ints, joined: int) -> bool:
 
 
 @kernel
-def _look(bits: Bytes, starts: Ints, sizes: Ints, elements: Ints, i: int) -> int:
-    """Whom member i sees with all members on these elements, as bits; −1 if it is too near to one."""
-    seen = 0
-    for j in range(elements.shape[0]):
-        if j != i:
-            pair = bits[starts[i, j] + elements[i] * sizes[j] + elements[j]]
-            if pair & APART == 0:
-                return -1
-            if pair & SEES:
-                seen |= 1 << j
-    return seen
-
-
-@kernel
-def _set_row(adjacent: Ints, i: int, seen: int) -> None:
-    adjacent[i] = seen
-    for j in range(adjacent.shape[0]):
-        adjacent[j] = adjacent[j] & ~(1 << i) | ((seen >> j & 1) << i)
-
-
-@kernel
 def _is_connected(adjacent: Ints, joined: int, links: Ints) -> bool:
     for i in range(links.shape[0]):
         if links[i] & ~adjacent[i]:
             return False
     return is_joined(adjacent, joined)
+
+
+@kernel
+def _look(bits: Bytes, starts: Ints, sizes: Ints, elements: Ints, state: Ints, i: int) -> int:
+    """Whom member i sees with all members on these elements, as bits.
+
+    −1 if it is too near to one, or the state that they come to is a dead end for it and another.
+    """
+    seen = 0
+    for j in range(elements.shape[0]):
+        if j != i:
+            pair = bits[starts[i, j] + elements[i] * sizes[j] + elements[j]]
+            if pair & APART == 0 or bits[starts[i, j] + 2 * (state[i] * sizes[j] + state[j])] & OPEN == 0:
+                return -1
+            if pair & SEES:
+                seen |= 1 << j
+    return seen
 
 
 @kernel
@@ -118,29 +141,30 @@ def _stand(
         elements[i] = 2 * state[i]
     apart = True
     for i in range(state.shape[0]):
-        adjacent[i] = _look(bits, starts, sizes, elements, i)
-        if adjacent[i] < 0:
-            apart = False
+        adjacent[i] = _look(bits, starts, sizes, elements, state, i)
+        apart = apart and adjacent[i] >= 0
     return apart and _is_connected(adjacent, joined, links)
 
 
 @kernel
 def _add_mover(
-    bits: Bytes, starts: Ints, sizes: Ints, i: int, joined: int, links: Ints, elements: Ints, adjacent: Ints,
-    trial: Ints,
+    bits: Bytes, starts: Ints, sizes: Ints, i: int, joined: int, links: Ints, elements: Ints, state: Ints,
+    adjacent: Ints, trial: Ints,
 ) -> bool:  # fmt: skip
-    """Let member i go on by one piece if it may, together with those that go already."""
+    """Let member i go on by one piece if it may, together with those that go already: ``state`` is where they come."""
     elements[i] += 1
-    seen = _look(bits, starts, sizes, elements, i)
+    state[i] += 1
+    seen = _look(bits, starts, sizes, elements, state, i)
     if seen >= 0:
-        if seen == adjacent[i]:
-            return True
         trial[:] = adjacent
-        _set_row(trial, i, seen)
-        if _is_connected(trial, joined, links):
+        trial[i] = seen
+        for j in range(trial.shape[0]):
+            trial[j] = trial[j] & ~(1 << i) | (seen >> j & 1) << i
+        if seen == adjacent[i] or _is_connected(trial, joined, links):
             adjacent[:] = trial
             return True
     elements[i] -= 1
+    state[i] -= 1
     return False
 
 
@@ -160,89 +184,100 @@ def _rank(state: Ints, last: Ints, remaining: Floats, ranked: Ints) -> int:
 
 
 @kernel
+def _go_together(
+    bits: Bytes, starts: Ints, sizes: Ints, joined: int, links: Ints, remaining: Floats, last: Ints
+) -> Ints:
+    """Steps of as many movers as can, until nobody can: states (n + 1, k)."""
+    k = last.shape[0]
+    states = np.zeros((last.sum() + 1, k), np.int64)
+    state, elements, adjacent, trial, ranked = (
+        np.zeros(k, np.int64), np.zeros(k, np.int64), np.zeros(k, np.int64), np.zeros(k, np.int64),
+        np.zeros(k, np.int64),
+    )  # fmt: skip
+    n = 0
+    moved = _stand(bits, starts, sizes, state, joined, links, elements, adjacent)
+    while moved:
+        moved = False
+        count = _rank(states[n], last, remaining, ranked)
+        _stand(bits, starts, sizes, state, joined, links, elements, adjacent)
+        for r in range(count):
+            if _add_mover(bits, starts, sizes, ranked[r], joined, links, elements, state, adjacent, trial):
+                moved = True
+        if moved:
+            n += 1
+            states[n] = state
+    return states[: n + 1].copy()
+
+
+@kernel
 def _find_slot(state: Ints, known: Ints, slots: Ints) -> int:
     """Where a state is, or would be, in a table of hashes; ``slots`` holds rows of ``known``, −1 where empty."""
     h = np.uint64(1469598103934665603)
     for i in range(state.shape[0]):
-        h = (h ^ np.uint64(state[i] + 1)) * np.uint64(1099511628211)
+        h = (h ^ np.uint64(state[i])) * np.uint64(1099511628211)
         h ^= h >> np.uint64(29)
-    mask = slots.shape[0] - 1
-    slot = int(np.int64(h & np.uint64(mask)))
-    while slots[slot] >= 0:
-        row = slots[slot]
-        same = True
-        for i in range(state.shape[0]):
-            if known[row, i] != state[i]:
-                same = False
-                break
-        if same:
-            return slot
-        slot = (slot + 1) & mask
-    return slot
+    slot = np.int64(h & np.uint64(slots.shape[0] - 1))
+    while slots[slot] >= 0 and not np.array_equal(known[slots[slot]], state):
+        slot = (slot + 1) % slots.shape[0]
+    return int(slot)
 
 
 @kernel
 def _search(
     bits: Bytes, starts: Ints, sizes: Ints, joined: int, links: Ints, remaining: Floats, last: Ints, most_states: int
 ) -> tuple[Ints, bool]:
+    """Steps of one mover after the other, or of all that are free: states (n + 1, k), and whether all were tried."""
     k = last.shape[0]
-    capacity = 1024
-    known = np.zeros((capacity, k), np.int64)
-    before = np.full(capacity, -1, np.int64)
-    tried = np.zeros(capacity, np.int64)
-    slots = np.full(4 * capacity, -1, np.int64)
+    known = np.zeros((most_states + 1, k), np.int64)
+    before, tried = np.full(most_states + 1, -1, np.int64), np.zeros(most_states + 1, np.int64)
+    size = 64
+    while size < 2 * most_states:
+        size *= 2
+    slots = np.full(size, -1, np.int64)
     state, elements, adjacent, trial, ranked = (
         np.zeros(k, np.int64), np.zeros(k, np.int64), np.zeros(k, np.int64), np.zeros(k, np.int64),
         np.zeros(k, np.int64),
     )  # fmt: skip
+    conflicts = find_last_conflicts(bits, starts, sizes, last)
+    ahead = find_last_ahead(conflicts)
+    grouped = joined == 0 and not links.any()
     slots[_find_slot(state, known, slots)] = 0
-    found = 1
-    best, least = 0, np.inf
-    top = 0
+    found, top, best, least = 1, 0, 0, np.inf
     if not _stand(bits, starts, sizes, state, joined, links, elements, adjacent):
-        return known[:1].copy(), False
-    while top >= 0 and found < most_states:
-        left = 0.0
-        for i in range(k):
-            left += remaining[i, known[top, i]]
-        if left < least:
-            best, least = top, left
-        count = _rank(known[top], last, remaining, ranked)
-        if count == 0:
-            break
+        top = -1
+    while top >= 0 and found <= most_states:
+        here = known[top]
+        count = _rank(here, last, remaining, ranked)
+        if tried[top] == 0:
+            left = 0.0
+            for i in range(k):
+                left += remaining[i, here[i]]
+            if left < least:
+                best, least = top, left
+            if count == 0:
+                break
         if tried[top] > count:
             top = before[top]
             continue
-        _stand(bits, starts, sizes, known[top], joined, links, elements, adjacent)
-        state[:] = known[top]
-        if tried[top] == 0:
-            moved = False
-            for r in range(count):
-                if _add_mover(bits, starts, sizes, ranked[r], joined, links, elements, adjacent, trial):
-                    state[ranked[r]] += 1
-                    moved = True
-            if not moved:
-                top = before[top]
-                continue
-            tried[top] = 1
+        if tried[top] == 0 and move_freely(conflicts, here, last, state):
+            tried[top] = count + 1
         else:
+            tried[top] = max(1, tried[top])
             i = ranked[tried[top] - 1]
             tried[top] += 1
-            if not _add_mover(bits, starts, sizes, i, joined, links, elements, adjacent, trial):
+            if grouped and not find_cluster(ahead, here, ranked[0]) >> i & 1:
                 continue
-            state[i] += 1
+            state[:] = here
+            _stand(bits, starts, sizes, state, joined, links, elements, adjacent)
+            if not _add_mover(bits, starts, sizes, i, joined, links, elements, state, adjacent, trial):
+                continue
         slot = _find_slot(state, known, slots)
-        if slots[slot] >= 0:
-            continue
-        if found == capacity:
-            capacity *= 2
-            known, before, tried, slots = _grow(known, before, tried, capacity)
-            slot = _find_slot(state, known, slots)
-        known[found] = state
-        before[found] = top
-        slots[slot] = found
-        top = found
-        found += 1
+        if slots[slot] < 0:
+            known[found] = state
+            before[found] = top
+            slots[slot] = found
+            top = found
+            found += 1
     length = 0
     row = best
     while row >= 0:
@@ -254,20 +289,34 @@ def _search(
         length -= 1
         states[length] = known[row]
         row = before[row]
-    complete = True
-    for i in range(k):
-        if states[-1, i] < last[i]:
-            complete = False
-    return states, complete
+    return states, top < 0
 
 
 @kernel
-def _grow(known: Ints, before: Ints, tried: Ints, capacity: int) -> tuple[Ints, Ints, Ints, Ints]:
-    found = known.shape[0]
-    more_known = np.zeros((capacity, known.shape[1]), np.int64)
-    more_before, more_tried = np.full(capacity, -1, np.int64), np.zeros(capacity, np.int64)
-    more_known[:found], more_before[:found], more_tried[:found] = known, before, tried
-    slots = np.full(4 * capacity, -1, np.int64)
-    for row in range(found):
-        slots[_find_slot(more_known[row], more_known, slots)] = row
-    return more_known, more_before, more_tried, slots
+def _hasten(states: Ints, bits: Bytes, starts: Ints, sizes: Ints, joined: int, links: Ints) -> Ints:
+    """The same moves, each in the earliest step in which its mover may go along: states (n + 1, k)."""
+    k = states.shape[1]
+    states = states.copy()
+    state, elements, adjacent, trial = (
+        np.zeros(k, np.int64), np.zeros(k, np.int64), np.zeros(k, np.int64), np.zeros(k, np.int64)
+    )  # fmt: skip
+    for t in range(1, states.shape[0] - 1):
+        for i in range(k):
+            # A step that several go along with is in order without one of them too: it may have gone before.
+            u = t
+            while u > 0 and states[u, i] < states[u + 1, i] and states[u - 1, i] == states[u, i]:
+                state[:] = states[u - 1]
+                _stand(bits, starts, sizes, state, joined, links, elements, adjacent)
+                for j in range(k):
+                    if states[u - 1, j] < states[u, j]:
+                        _add_mover(bits, starts, sizes, j, joined, links, elements, state, adjacent, trial)
+                if not _add_mover(bits, starts, sizes, i, joined, links, elements, state, adjacent, trial):
+                    break
+                states[u, i] += 1
+                u -= 1
+    kept = 1
+    for t in range(1, states.shape[0]):
+        if not np.array_equal(states[t], states[kept - 1]):
+            states[kept] = states[t]
+            kept += 1
+    return states[:kept].copy()

@@ -35,16 +35,18 @@ class PathElements:
         return len(self.nodes) - 1
 
 
-def cut_path(path: Floats, longest_m: float) -> PathElements:
+def cut_path(path: Floats, longest_m: float, halvings: int = 0) -> PathElements:
     """Cut a path at its corners, and each leg into equal pieces.
 
     Args:
         path: (m, 2) float, metres, map frame, m ≥ 1; points that repeat their predecessor are left out.
         longest_m: no piece is longer, metres.
+        halvings: how often all these pieces are halved after that; so what is possible with fewer halvings is possible
+            with more.
     """
     steps = np.hypot(*np.diff(path, axis=0).T)
     path = path[np.append(True, steps > 0.0)]
-    counts = np.ceil(steps[steps > 0.0] / longest_m).astype(np.int64)
+    counts = np.ceil(steps[steps > 0.0] / longest_m).astype(np.int64) << halvings
     corners = np.append(0, np.cumsum(counts))
     # Node a lies on the path at coordinate a of a piecewise linear chart; corners are met exactly.
     at = np.arange(corners[-1] + 1)

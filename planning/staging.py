@@ -2,9 +2,8 @@
 
 A schedule in stages is a row of *cuts*: the nodes at which each stage begins and the last one ends. Members are always
 within two stages that follow each other, so the rule for cuts c is: the box of all places between c_n and c_(n+2) is in
-order, for every n. Any cuts taken from the states of an order keep to its way; the more states between two cuts, the
-less the members wait for each other. Where only the box of one stage is in order, an empty stage follows it (a cut
-given twice), and all wait for all.
+order, for every n. Cuts are taken from the states of an order; the fewer, the less the members wait for each other.
+Where only the box of a single step is in order, an empty stage follows it (a cut given twice), and all wait for all.
 """
 
 from __future__ import annotations
@@ -26,7 +25,18 @@ Bytes = NDArray[np.uint8]
 
 
 def choose_cuts(states: Ints, tables: PairTables, demand: Demand) -> Ints:
-    """Which of the states (m, k) are cuts: (n + 1,) int, rising or staying, n ≥ 1."""
+    """Which states of an order are cuts.
+
+    Args:
+        states: (m, k) int, m ≥ 2: nodes, never falling; from each to the next all places in between are in order.
+        tables: of all pairs.
+        demand: what has to be connected.
+
+    Returns:
+        (n + 1,) int: rows of ``states``, rising or staying, n ≥ 1.
+
+    Complexity: O(k² (n² + m)) for n elements each.
+    """
     faults = _count_faults(tables.bits, tables.starts, tables.sizes)
     cuts: Ints = _choose(states, faults, tables.starts, tables.sizes, demand.joined, demand.links)
     return cuts
@@ -92,30 +102,27 @@ def _box_is_free(
 
 @kernel
 def _choose(states: Ints, faults: Ints, starts: Ints, sizes: Ints, joined: int, links: Ints) -> Ints:
+    """Each stage goes half as far as the box of two stages could; the second of the two then mostly fits in."""
     n = states.shape[0] - 1
     adjacent = np.empty(states.shape[1], np.int64)
-    # How far the box of two stages that begin at each state may reach.
-    reach = np.empty(n + 1, np.int64)
-    for s in range(n + 1):
-        low, high = states[s].copy(), states[s].copy()
-        reach[s] = s
-        for t in range(s + 1, n + 1):
-            low, high = np.minimum(low, states[t]), np.maximum(high, states[t])
-            if not _box_is_free(low, high, faults, starts, sizes, joined, links, adjacent):
-                break
-            reach[s] = t
     cuts = np.empty(2 * n + 2, np.int64)
     cuts[0] = 0
     count = 1
-    if reach[0] == n:
-        cuts[1] = n
-        return cuts[:2]
+    before = here = 0  # how far the boxes that begin at the last cut but one, and at the last, may reach
     while cuts[count - 1] < n:
-        here = cuts[count - 1]
-        until = n if count == 1 else reach[cuts[count - 2]]
-        middle = (here + reach[here] + 1) // 2
-        cuts[count] = max(here, min(until, middle))
+        cut = cuts[count - 1]
+        here = max(here, cut)
+        while here < n and _box_is_free(
+            states[cut], states[here + 1], faults, starts, sizes, joined, links, adjacent
+        ):  # fmt: skip
+            here += 1
+        if count == 1:
+            before = here
+            cuts[1] = n if here == n else (here + 1) // 2
+        else:
+            cuts[count] = max(cut, min(before, (cut + here + 1) // 2))
         count += 1
+        before = here
     return cuts[:count].copy()
 
 
