@@ -14,6 +14,7 @@ from planning.bridge import cross_bridge
 from planning.continuation import follow
 from planning.detour import blocked_by_standing, other_paths, paths_around, shortest_paths, space_around_standing
 from planning.motion_plan import Schedule
+from planning.move_search import Moves
 from planning.no_schedule import NoSchedule
 from planning.runs import shorten_runs, stage_runs
 from planning.stepwise import Steps
@@ -52,6 +53,7 @@ class Attempts:
     ) -> None:
         self._task, self._placements, self._effort = task, placements, effort
         self._yielding = [row for row in task.standing if task.members[row] in yielding]
+        self._found: dict[tuple[Steps, tuple[int, ...]], Moves] = {}
         self.reason = ""
         self.between: tuple[str, str] | None = None
 
@@ -67,7 +69,7 @@ class Attempts:
             except NoSchedule as problem:
                 self._blame(problem.text, problem.between)
         for steps in self._crews():
-            moves = steps.search(steps.starts, steps.goals, level, self._effort)
+            moves = self._search(steps, level)
             staged = self._stage(steps, moves.places, level) if moves.complete else None
             if staged is not None:
                 yield staged, "stepwise"
@@ -83,8 +85,7 @@ class Attempts:
         if not task.movers or task.parts(task.starts, level) is not None:
             return self._stand()
         steps = self._crew
-        places = steps.search(steps.starts, steps.goals, level, self._effort).places
-        return self._stage(steps, places, level) or self._stand()
+        return self._stage(steps, self._search(steps, level).places, level) or self._stand()
 
     def patch(self, level: Level) -> Schedule | None:
         """Connected as far as the team gets from its start, and again as soon as it can be before the goals."""
@@ -94,7 +95,7 @@ class Attempts:
         steps = self._crew
         there, back = steps.starts[None], steps.goals[None]
         if task.parts(task.starts, level) is None:
-            there = steps.search(steps.starts, steps.goals, level, self._effort).places
+            there = self._search(steps, level).places
         if task.parts(task.goals, level) is None:
             back = steps.search(steps.goals, there[-1], level, self._effort).places[::-1]
         between = steps.search(there[-1], back[0], NOTHING, self._effort)
@@ -142,6 +143,13 @@ class Attempts:
     @cached_property
     def _larger_crew(self) -> Steps:
         return Steps(self._task, [*self._task.movers, *self._yielding], self._placements)
+
+    def _search(self, steps: Steps, level: Level) -> Moves:
+        """Moves from the start to the goals, or as near as was found; looked for once."""
+        key = steps, level.rows
+        if key not in self._found:
+            self._found[key] = steps.search(steps.starts, steps.goals, level, self._effort)
+        return self._found[key]
 
     def _stage(self, steps: Steps, places: Ints, level: Level) -> Schedule | None:
         """Deployments (n, m) made into stages; None if a run is not allowed after all."""

@@ -46,16 +46,14 @@ class Steps:
         self._task, self.movers = task, list(movers)
         self._rows = [*movers, *(row for row in range(len(task.members)) if row not in movers)]
         common = _join_placements(task.environment, task.geodesics, placements, float(task.radii_m[self.movers].max()))
-        coming = [row for row in movers if np.any(task.starts[row] != task.goals[row])]
-        ends = np.concatenate([task.starts[self._rows], task.goals[coming]])
-        self.roadmap: TeamRoadmap = extend_roadmap(common, task.free, np.concatenate([ends, self._rings(ends)]))
-        first = len(common.places)
-        self.starts: Ints = first + np.arange(len(movers))
+        ends = np.concatenate([task.starts[self._rows], task.goals[self.movers]])
+        new, numbers = _number(ends, common.places)
+        self.roadmap: TeamRoadmap = extend_roadmap(common, task.free, np.concatenate([new, self._rings(new)]))
+        self._standing: Ints = numbers[len(movers) : len(self._rows)]
+        self.starts: Ints = numbers[: len(movers)]
         """(m,) int: where the movers are, on the roadmap."""
-        self.goals: Ints = self.starts.copy()
+        self.goals: Ints = numbers[len(self._rows) :]
         """(m,) int: where they go."""
-        self.goals[np.isin(movers, coming)] = first + len(self._rows) + np.arange(len(coming))
-        self._standing: Ints = first + np.arange(len(movers), len(self._rows))
 
     def _rings(self, kept: Floats) -> Floats:
         """Places (n, 2) around all discs at their starts and goals, none near to another or to those kept."""
@@ -66,7 +64,7 @@ class Steps:
         for i in self._rows:
             for place in (task.starts[i], task.goals[i]) if task.radii_m[i] > 0.0 else ():
                 for spot in ring(place, widest + float(task.radii_m[i]), task.free):
-                    if np.hypot(*(kept - spot).T).min() > near:
+                    if np.hypot(*(kept - spot).T).min(initial=np.inf) > near:
                         kept = np.concatenate([kept, spot[None]])
         return kept[first:]
 
@@ -107,3 +105,15 @@ def _join_placements(
     else:
         places = placements.positions[free.contains(placements.positions)]
     return make_roadmap(environment, free, np.concatenate([places, find_mitres(environment, free, radius_m)]))
+
+
+def _number(places: Floats, known: Floats) -> tuple[Floats, Ints]:
+    """Places (n, 2) that are not among those known, each once, and the numbers of all when they are put after these."""
+    new: list[Floats] = []
+    numbers = []
+    for place in places:
+        same = np.flatnonzero(np.all(np.concatenate([known, np.reshape(new, (-1, 2))]) == place, axis=1))
+        numbers.append(int(same[0]) if len(same) else len(known) + len(new))
+        if not len(same):
+            new.append(place)
+    return np.reshape(new, (-1, 2)), np.array(numbers, dtype=np.int64)

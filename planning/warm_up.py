@@ -18,6 +18,7 @@ def exercise() -> None:
     from planning.geodesic import GeodesicMap
     from planning.grid_outline import outline
     from planning.grid_schedule import grid_schedule
+    from planning.motion import plan_motion
     from planning.motion_plan import Schedule, TimedPath
     from planning.mutual_visibility import mutual_visibility
     from planning.ordered_chain import search_in_order
@@ -57,6 +58,8 @@ def exercise() -> None:
     crossing = [[(8.0, 4.0), (1.0, 4.5)], [(7.0, 6.0), (7.0, 5.0), (10.0, 4.0)]]
     grid_schedule(crossing, np.full(2, 0.2), rooms, members=["a", "b"], speed_m_s=np.ones(2))
     certify(Schedule(two.members, two.paths, 0.2, stages=[(0, 1), (0, 0)]), rooms, links=[("a", "b")], ends=("a", "b"))
+    past_each_other = [(7.0, 4.0), (11.0, 4.0)], [(11.0, 4.0), (7.0, 4.0)]
+    plan_motion(rooms, *past_each_other, 0.2, members=["a", "b"], unscheduled={"c": [(9.0, 4.0), (9.0, 4.5)]})
     time_in_sight(rooms, points[:2], points[2], 1.0, 0.5)
     graph = PlacementGraph.from_points(rooms, 0.2, 2.0)
     graph.distances_from(points[0])
