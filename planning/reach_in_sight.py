@@ -46,7 +46,8 @@ def time_in_sight(
     Args:
         environment: the walls.
         watcher: (2,) or (m, 2) float, metres, map frame: its place, or a way, any place of which it may be at.
-        target: (2,) or (n, 2) float, metres: its place, or places whose convex hull it is in.
+        target: (2,) or (n, 2) float, metres: its place, or places whose convex hull it is in. It is in free space: what
+            of this lies in walls does not count.
         speed_m_s: the most that the target can go, more than 0.
         radius_m: by which the target may be away from that, metres.
 
@@ -55,7 +56,7 @@ def time_in_sight(
         all places of the watcher.
 
     Raises:
-        ValueError: the speed or the radius is not a number in its range.
+        ValueError: the speed or the radius is not a number in its range, or a place is missing or not finite.
 
     Complexity: O(r (m + c) w) for r reflex vertices, w walls and c lines through two vertices that cross the watcher's
         way; and for the way to the windows O(r² w) at worst, of what is nearer than the nearest window.
@@ -64,9 +65,11 @@ def time_in_sight(
         raise ValueError(f"a target's greatest speed is {speed_m_s} m/s: give a number above 0")
     if not 0.0 <= radius_m < np.inf:
         raise ValueError(f"a target is within {radius_m} m of its place: give a number of at least 0")
-    way = np.array(watcher, dtype=np.float64).reshape(-1, 2)
+    way, places = (np.array(points, dtype=np.float64).reshape(-1, 2) for points in (watcher, target))
+    if min(len(way), len(places)) == 0 or not (np.isfinite(way).all() and np.isfinite(places).all()):
+        raise ValueError("a watcher or a target is nowhere, or at a place that is not finite: give metres")
     pieces = np.stack([way[:-1], way[1:]], axis=1) if len(way) > 1 else np.stack([way, way], axis=1)
-    borders, witnesses = _bound_target(environment, np.array(target, dtype=np.float64).reshape(-1, 2), radius_m)
+    borders, witnesses = _bound_target(environment, places, radius_m)
     if len(borders) == 0 or not all(
         sees_throughout(environment, piece, (place, place)) for piece in pieces for place in witnesses
     ):

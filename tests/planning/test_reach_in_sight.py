@@ -127,3 +127,8 @@ def test_what_is_no_speed_or_radius_is_refused() -> None:
         time_in_sight(PILLAR, (1, 1), (7, 1), 0.0)
     with pytest.raises(ValueError, match="within nan m"):
         time_in_sight(PILLAR, (1, 1), (7, 1), 1.0, np.nan)
+    for nowhere in (np.empty((0, 2)), (1, np.nan)):
+        with pytest.raises(ValueError, match="is nowhere"):
+            time_in_sight(PILLAR, nowhere, (7, 1), 1.0)
+        with pytest.raises(ValueError, match="is nowhere"):
+            time_in_sight(PILLAR, (1, 1), nowhere, 1.0)
