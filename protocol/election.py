@@ -289,8 +289,7 @@ class Election:
         self._say_withdrawn()
 
     def _say_withdrawn(self) -> None:
-        self._rounds += 1
-        correlation = f"{self._incarnation}.{self._rounds}"
+        correlation = f"{self._incarnation}.0"  # of no round: no answer is wanted
         self._effects.append(Say(VoteRequest(epoch=self._withdrawn_epoch, correlation=correlation, withdrawn=True)))
 
     def _is_withdrawn(self, promise: Reign) -> bool:
