@@ -19,6 +19,7 @@ What the search finds is one after the other; then every move is made as early a
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,10 @@ from planning.pair_tables import APART, SEES, PairTables
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bytes = NDArray[np.uint8]
+
+
+STATES_IN_VAIN: Final = 1000
+"""Of a search for the best effort, where it is proven that not all get to their goals."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,12 +87,14 @@ def search_order(tables: PairTables, demand: Demand, durations: Floats, last: In
     states = _go_together(bits, starts, sizes, demand.joined, demand.links, remaining, last)
     if np.array_equal(states[-1], last):
         return Order(states, True, False, closed)
-    found, exhausted = _search(bits, starts, sizes, demand.joined, demand.links, remaining, last, most_states)
-    complete = np.array_equal(found[-1], last)
+    most = min(most_states, STATES_IN_VAIN) if len(closed) > 0 else most_states
+    found, exhausted = _search(bits, starts, sizes, demand.joined, demand.links, remaining, last, most)
+    if np.array_equal(found[-1], last):
+        return Order(_hasten(found, bits, starts, sizes, demand.joined, demand.links), True, False, closed)
     rows = np.arange(len(last))
-    if complete or remaining[rows, found[-1]].sum() < remaining[rows, states[-1]].sum():
-        states = _hasten(found, bits, starts, sizes, demand.joined, demand.links)
-    return Order(states, complete, not complete and bool(exhausted or len(closed) > 0), closed)
+    if remaining[rows, found[-1]].sum() < remaining[rows, states[-1]].sum():
+        states = found
+    return Order(states, False, bool(exhausted) or len(closed) > 0, closed)
 
 
 @kernel

@@ -124,6 +124,11 @@ def mark_prospects(bits: Bytes, starts: Ints, sizes: Ints, last: Ints, joined: i
                 for e in range(sizes[member]):
                     reach[side, e] = 1 << member | _spread(seen[member, e] & among, whole, among)
             required = links[i] >> j & 1 == 1
+            if not required and _is_open(bits, starts[i, j], sizes, i, j, reach, joined):
+                for at, count in ((starts[i, j], sizes[i] * sizes[j]), (starts[j, i], sizes[i] * sizes[j])):
+                    for entry in range(at, at + count):
+                        bits[entry] |= OPEN
+                continue
             for a in range(last[i], -1, -1):
                 for b in range(last[j], -1, -1):
                     if _leads_on(bits, starts[i, j], sizes[j], a, b, last[i], last[j], reach, joined, required):
@@ -133,6 +138,16 @@ def mark_prospects(bits: Bytes, starts: Ints, sizes: Ints, last: Ints, joined: i
                 closed[found, 0], closed[found, 1] = i, j
                 found += 1
     return closed[:found].copy()
+
+
+@kernel
+def _is_open(bits: Bytes, start: int, sizes: Ints, i: int, j: int, reach: Ints, joined: int) -> bool:
+    """Whether two members have nothing to do with each other: never near, and joined over others wherever they are."""
+    for side, member in enumerate((i, j)):
+        for e in range(sizes[member]):
+            if joined & ~reach[side, e]:
+                return False
+    return bool(np.all(bits[start : start + sizes[i] * sizes[j]] & APART))
 
 
 @kernel

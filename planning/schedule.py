@@ -12,6 +12,7 @@ more.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
@@ -22,7 +23,7 @@ from planning.motion_plan import Schedule
 from planning.no_schedule import NoSchedule
 from planning.obstruction import find_obstruction
 from planning.order_search import Order, search_order
-from planning.pair_tables import make_tables
+from planning.pair_tables import PairTables, make_tables
 from planning.path_elements import PathElements, cut_path
 from planning.schedule_request import Member, ScheduleRequest, read_request
 from planning.staging import choose_cuts, time_stages
@@ -101,40 +102,56 @@ def schedule(
         )
     if search != "order":
         raise ValueError(f"there is no search {search!r}: use 'order' or 'grid'")
-    alone = [
-        float(np.hypot(*np.diff(path, axis=0).T).sum()) / speed
-        for i, (path, speed) in enumerate(zip(request.paths, request.speeds_m_s, strict=True))
-        if i not in request.anywhere
-    ]
-    found: Schedule | None = None
-    refusal: NoSchedule | None = None
+    driving = [i for i in range(len(request.members)) if i not in request.anywhere]
+    alone = max((_measure(request.paths[i]) / float(request.speeds_m_s[i]) for i in driving), default=0.0)
+    best: tuple[float, Schedule] | None = None
     for halvings in range(HALVINGS + 1):
-        try:
-            tried = _search_order(request, halvings)
-        except NoSchedule as error:
-            refusal = error
-            continue
-        if found is None or _takes(tried) < _takes(found):
-            found = tried
-        if _takes(found) <= WAITING * max(alone, default=0.0):
-            break
-    if found is None:
-        assert refusal is not None
-        raise refusal
-    return found
+        attempt = _attempt(request, halvings)
+        if attempt.order.complete:
+            found = attempt.execute()
+            ends = max((float(found.paths[i].times_s[-1]) for i in driving), default=0.0)
+            if best is None or ends < best[0]:
+                best = ends, found
+            if ends <= WAITING * alone:
+                break
+    if best is None:
+        raise attempt.refuse()
+    return best[1]
 
 
-def _takes(found: Schedule) -> float:
-    """Until when members that are scheduled drive."""
-    return max(
-        (float(path.times_s[-1]) for name, path in zip(found.members, found.paths, strict=True)
-         if name not in found.unscheduled),
-        default=0.0,
-    )  # fmt: skip
+def _measure(path: Floats) -> float:
+    return float(np.hypot(*np.diff(path, axis=0).T).sum())
 
 
-def _search_order(request: ScheduleRequest, halvings: int) -> Schedule:
-    """The schedule with pieces of one length."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Attempt:
+    """What came of a request with pieces of one length."""
+
+    request: ScheduleRequest
+    elements: list[PathElements]
+    tables: PairTables
+    last: Ints
+    order: Order
+
+    def execute(self) -> Schedule:
+        """The order in stages."""
+        request, states = self.request, self.order.states
+        cuts = np.zeros(2, dtype=np.int64)
+        if len(states) > 1:
+            cuts = choose_cuts(states, self.tables, request.demand)
+        paths, stages = time_stages(states[cuts], self.elements, request.speeds_m_s, request.anywhere)
+        anywhere = [request.members[i] for i in request.anywhere]
+        return Schedule(request.members, paths, request.radii_m, request.speeds_m_s, stages, anywhere)
+
+    def refuse(self) -> NoSchedule:
+        """Why the order is not complete."""
+        names = self.request.members
+        blamed = find_obstruction(self.order, names, self.elements, self.tables, self.request.demand, self.last)
+        between = None if blamed.between is None else (names[blamed.between[0]], names[blamed.between[1]])
+        return NoSchedule(blamed.text, self.execute(), between, proven=self.order.proven)
+
+
+def _attempt(request: ScheduleRequest, halvings: int) -> _Attempt:
     demand = request.demand
     elements = [cut_path(path, LONGEST_PIECE_M, halvings) for path in request.paths]
     separations = request.radii_m[:, None] + request.radii_m
@@ -148,18 +165,4 @@ def _search_order(request: ScheduleRequest, halvings: int) -> Schedule:
     for i in np.flatnonzero(last):
         durations[i, : last[i]] = np.hypot(*np.diff(elements[i].nodes, axis=0).T) / request.speeds_m_s[i]
     order = search_order(tables, demand, durations, last, MOST_STATES)
-    cuts = choose_cuts(order.states, tables, demand) if len(order.states) > 1 else np.zeros(2, dtype=np.int64)
-    found = _execute(request, order, cuts, elements)
-    if not order.complete:
-        blamed = find_obstruction(order, request.members, elements, tables, demand, last)
-        between = None
-        if blamed.between is not None:
-            between = request.members[blamed.between[0]], request.members[blamed.between[1]]
-        raise NoSchedule(blamed.text, found, between, proven=order.proven)
-    return found
-
-
-def _execute(request: ScheduleRequest, order: Order, cuts: Ints, elements: Sequence[PathElements]) -> Schedule:
-    paths, stages = time_stages(order.states[cuts], elements, request.speeds_m_s, request.anywhere)
-    anywhere = [request.members[i] for i in request.anywhere]
-    return Schedule(request.members, paths, request.radii_m, request.speeds_m_s, stages, anywhere)
+    return _Attempt(request, elements, tables, last, order)

@@ -8,6 +8,7 @@ Where only the box of a single step is in order, an empty stage follows it (a cu
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -118,9 +119,7 @@ def _choose(states: Ints, faults: Ints, starts: Ints, sizes: Ints, joined: int, 
             here += 1
         if count == 1:
             before = here
-            cuts[1] = n if here == n else (here + 1) // 2
-        else:
-            cuts[count] = max(cut, min(before, (cut + here + 1) // 2))
+        cuts[count] = max(cut, min(before, n if here == n else (cut + here + 1) // 2))
         count += 1
         before = here
     return cuts[:count].copy()
@@ -132,7 +131,7 @@ def time_stages(
     """The earliest execution of stages under the rule of progress.
 
     Args:
-        states: (n + 1, k) int: the nodes at which each stage begins, and the last one ends.
+        states: (n + 1, k) int: the nodes at which each stage begins, and the last one ends, never falling.
         elements: of each path.
         speeds_m_s: (k,) float, positive.
         anywhere: the members that go along their whole paths as they please, and wait for nobody.
@@ -141,43 +140,39 @@ def time_stages(
         paths: k paths; they start at 0 s.
         stages: (k, n + 1) int: their waypoints at the cuts.
     """
-    stages, members = len(states) - 1, len(elements)
-    finish = np.zeros((members, stages + 1))
-    paths = []
-    rows = np.zeros((members, stages + 1), dtype=np.int64)
-    waypoints: list[list[Floats]] = [[path.nodes[0]] for path in elements]
-    times: list[list[float]] = [[0.0] for _ in elements]
-    scheduled = [i for i in range(members) if i not in anywhere]
-    done = 0.0  # when all have finished the stage before the last one
-    for n in range(stages):
-        if n > 1:
-            done = float(finish[scheduled, n - 1].max(initial=0.0))
+    cuts = states.T.tolist()
+    ways = [_Way(path, float(speed)) for path, speed in zip(elements, speeds_m_s, strict=True)]
+    scheduled = [i for i in range(len(ways)) if i not in anywhere]
+    done = [0.0, 0.0]  # when all have finished the stage before the last one, and the last one
+    for n in range(len(states) - 1):
         for i in scheduled:
-            a, b = int(states[n, i]), int(states[n + 1, i])
-            finish[i, n + 1] = finish[i, n]
-            if a != b:
-                begin = max(float(finish[i, n]), done)
-                if begin > times[i][-1]:
-                    waypoints[i].append(waypoints[i][-1])
-                    times[i].append(begin)
-                for node in _turns(elements[i], a, b):
-                    place = elements[i].nodes[node]
-                    way = float(np.hypot(*(place - waypoints[i][-1])))
-                    waypoints[i].append(place)
-                    times[i].append(times[i][-1] + way / speeds_m_s[i])
-                finish[i, n + 1] = times[i][-1]
-            rows[i, n + 1] = len(waypoints[i]) - 1
+            ways[i].drive(cuts[i][n + 1], done[0])
+        done = [done[1], max((ways[i].times[-1] for i in scheduled), default=0.0)]
     for i in anywhere:
-        corners = elements[i].nodes[elements[i].corners]
-        steps = np.hypot(*np.diff(corners, axis=0).T) / speeds_m_s[i]
-        waypoints[i], times[i] = list(corners), [0.0, *np.cumsum(steps).tolist()]
-        rows[i, -1] = len(corners) - 1
-    paths = [TimedPath(np.array(w), t) for w, t in zip(waypoints, times, strict=True)]
-    return paths, rows
+        ways[i].drive(elements[i].pieces, 0.0)
+        ways[i].rows = [0] * (len(states) - 1) + ways[i].rows[-1:]
+    paths = [TimedPath(way.waypoints, way.times) for way in ways]
+    return paths, np.array([way.rows for way in ways], dtype=np.int64)
 
 
-def _turns(path: PathElements, a: int, b: int) -> list[int]:
-    """The corners between two nodes, in the order in which they are passed, and the second node."""
-    low, high = min(a, b), max(a, b)
-    between = [int(c) for c in path.corners if low < c < high]
-    return [*(between if a < b else between[::-1]), b]
+class _Way:
+    """What a member drives, stage by stage, at full speed."""
+
+    def __init__(self, path: PathElements, speed_m_s: float) -> None:
+        self.nodes, self.corners = path.nodes.tolist(), path.corners.tolist()
+        self.speed_m_s = speed_m_s
+        self.node = 0
+        self.waypoints, self.times, self.rows = [self.nodes[0]], [0.0], [0]
+
+    def drive(self, node: int, earliest_s: float) -> None:
+        """Go on to a node in one stage."""
+        if node > self.node:
+            if earliest_s > self.times[-1]:
+                self.waypoints.append(self.waypoints[-1])
+                self.times.append(earliest_s)
+            for turn in (*(corner for corner in self.corners if self.node < corner < node), node):
+                way = math.dist(self.waypoints[-1], self.nodes[turn])
+                self.waypoints.append(self.nodes[turn])
+                self.times.append(self.times[-1] + way / self.speed_m_s)
+            self.node = node
+        self.rows.append(len(self.waypoints) - 1)
