@@ -184,7 +184,6 @@ class BaseStation:
         """See to what the dispatcher has come to, after it was told something."""
         for text in self._dispatcher.reports:
             self._log("warning", text)
-            self._urgent = True
         self._dispatcher.reports.clear()
         if not self._planning:  # what is planned begins where the robots may go now
             self._dispatcher.release()
@@ -204,7 +203,7 @@ class BaseStation:
             return
         self._planning = True
         question = Question(
-            way=(agent.body.position, *agent.body.path),
+            way=agent.body.path or (agent.body.position,),
             onset=onset,
             lead_s=self._dispatcher.lead_s,
             previous=self._plan,

@@ -53,6 +53,8 @@ class Dispatcher:
         self._heading: Mapping[str, Point] = {}
         self._plan = 0
         """Number of the present plan, or of the next."""
+        self._asked = False
+        """Whether a motion of that plan has been asked for."""
         self._held: Authority | None = None
         """The first order to hold since the last plan ended."""
         self._ordered: Authority | None = None
@@ -147,6 +149,7 @@ class Dispatcher:
         if not self._all_stand():
             return None
         places = {self._base: self._position} | {name: state.position for name, state in self._states.items()}
+        self._asked = True
         return Onset(self._plan, 0, 0, places)
 
     def take(self, course: Course) -> bool:
@@ -182,10 +185,11 @@ class Dispatcher:
         if why:
             self.reports.append(f"{why}: everybody holds, then a new plan begins")
         self.news = True
-        self._ended = self._authority or self._ended
-        self._authority = self._held = self._ordered = None
-        self._heading = {}
-        self._plan += 1
+        if self._authority is not None:
+            self._ended, self._authority, self._held = self._authority, None, None
+        self._ordered, self._heading = None, {}
+        self._plan += self._asked  # what is being planned is out of date
+        self._asked = False
 
     def _all_stand(self) -> bool:
         held = self._held

@@ -21,10 +21,8 @@ from itertools import pairwise
 from typing import Final, Literal, TypeAlias
 
 import numpy as np
-from msgspec import structs
 from numpy.typing import NDArray
 
-from agents.assignment import assign
 from agents.outlook import Outlook
 from agents.proposals import PREVIEWS_M, Proposal, Proposer, name_place, relays_in_words
 from agents.spares import Waiting
@@ -218,23 +216,18 @@ class DeploymentPlanner:
         previous: Plan | None,
         obstacles: Sequence[Point],
     ) -> Plan:
-        manned = {relay.robot for relay in chosen.relays}
+        relays = chosen.relays
+        names = [self._base_name, *(relay.robot for relay in relays), *([self._agent_name] if chosen.complete else [])]
+        manned = {relay.robot for relay in relays}
         spares = {name: place for name, place in robots.items() if name not in manned}
-        sent = {} if previous is None else {placement.robot: placement for placement in previous.placements}
-        waited = {name: placement.position for name, placement in sent.items() if placement.spare}
-        chain = [self._base, *(relay.position for relay in chosen.relays)]
-        waiting = self._waiting.places(self._inside(way[0]), chain, spares, waited, obstacles)
-        placements = [
-            *chosen.relays,
-            *(Placement(robot=name, position=place, spare=True) for name, place in waiting.items()),
-        ]
-        # The search has looked at the relays only: whoever would overtake another goes to that one's place instead.
-        before = {name: placement.position for name, placement in sent.items()}
-        names = assign(self._geodesics, robots, [placement.position for placement in placements], before)
-        placements = [structs.replace(place, robot=name) for place, name in zip(placements, names, strict=True)]
-        ends = [self._base_name, *names[: len(chosen.relays)], *([self._agent_name] if chosen.complete else [])]
+        before = (
+            {} if previous is None else {place.robot: place.position for place in previous.placements if place.spare}
+        )
+        chain = [self._base, *(relay.position for relay in relays)]
+        waiting = self._waiting.places(self._inside(way[0]), chain, spares, before, obstacles)
+        placements = tuple(Placement(robot=name, position=place, spare=True) for name, place in waiting.items())
         return Plan(
-            tuple(placements), tuple(pairwise(ends)), chosen.cost, needed, chosen.complete, chosen.reason,
+            (*relays, *placements), tuple(pairwise(names)), chosen.cost, needed, chosen.complete, chosen.reason,
             chosen.total_cost_m, chosen.lower_bound_m,
         )  # fmt: skip
 

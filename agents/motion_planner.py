@@ -81,7 +81,7 @@ class MotionPlanner:
     def __init__(self, mission: Mission, environment: Environment, placements: PlacementGraph, judge: Judge) -> None:
         self._mission, self._environment = mission, environment
         self._placements, self._judge = placements, judge
-        self._geodesics = placements.geodesics
+        self.geodesics = placements.geodesics
         self.base, self._agent = mission.base_station.name, mission.tracked_agent.name
 
     def plan(
@@ -120,7 +120,7 @@ class MotionPlanner:
                 joined=joined,
                 unscheduled={self._agent: ahead} if self._agent in joined else None,
                 obstacles=[(where, self._mission.robot_radius_m) for where in obstacles.values()],
-                geodesics=self._geodesics,
+                geodesics=self.geodesics,
                 placements=self._placements,
                 may_part=False,
                 effort=EFFORT if joined else LAST_EFFORT,

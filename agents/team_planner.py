@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from msgspec import structs
 from numpy.typing import NDArray
 
+from agents.assignment import assign
 from agents.movement_authority import Onset
 from planning.foresight import length, walk
 from protocol.messages import Point
@@ -18,6 +20,9 @@ if TYPE_CHECKING:
     from agents.motion_planner import Course, MotionPlanner
 
 Floats = NDArray[np.float64]
+
+EXCHANGED: Final = "; robots exchange places, so that none has to overtake"
+"""Added to the reason of a plan."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +68,7 @@ class TeamPlanner:
         robots = {name: place for name, place in onset.places.items() if name != self._motions.base}
         obstacles = [place for lost in question.lost.values() for place in _points(lost)]
         plan = self._deployments.plan(_point(way[0]), _points(way), robots, question.previous, obstacles)
+        plan = self._exchange(plan, robots, question.previous)
         goals = {placement.robot: placement.position for placement in plan.placements}
         if not robots or goals == question.heading:
             return Answer(plan, None)
@@ -78,6 +84,18 @@ class TeamPlanner:
             return Answer(plan, self._motions.plan(onset, goals, ends, way, question.lost))
         except ValueError as problem:
             return Answer(plan, None, str(problem))
+
+    def _exchange(self, plan: Plan, robots: Mapping[str, Point], previous: Plan | None) -> Plan:
+        """The same places, and nobody overtakes: the search for relays has not looked at who is in whose way."""
+        before = {} if previous is None else {place.robot: place.position for place in previous.placements}
+        names = assign(self._motions.geodesics, robots, [place.position for place in plan.placements], before)
+        renamed = {place.robot: name for place, name in zip(plan.placements, names, strict=True)}
+        if all(old == new for old, new in renamed.items()):
+            return plan
+        placements = tuple(structs.replace(place, robot=renamed[place.robot]) for place in plan.placements)
+        edges = tuple((renamed.get(one, one), renamed.get(other, other)) for one, other in plan.edges)
+        reason = plan.reason.removesuffix(EXCHANGED) + EXCHANGED
+        return replace(plan, placements=placements, edges=edges, reason=reason)
 
 
 def _without(way: Floats, length_m: float) -> Floats:

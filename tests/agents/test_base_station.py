@@ -1,9 +1,9 @@
-"""The base station with a planner that does what the test wants."""
+"""The base station with a planner that does what the test wants, and robots that obey."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -11,15 +11,32 @@ from typing import Any
 import pytest
 from msgspec import structs
 
-from agents.base_station import GRACE_S, BaseStation, silence_s
+from agents.base_station import AGAIN_S, GRACE_S, PACE_S, BaseStation, silence_s
 from agents.leader import Plan
 from agents.mission import Mission
-from agents.records import Connectivity, Decision, Planned, Track
+from agents.motion_planner import Course
+from agents.records import Connectivity, Decision, Ordered, Planned, Track
 from agents.role import Compute, Effect, Heard, JobDone
+from agents.team_planner import Answer, Question
 from planning.environment import Environment
 from protocol.bus import PeerVanished
 from protocol.keys import Address
-from protocol.messages import AnyBody, Deployment, Envelope, Heartbeat, Intent, Placement, Point, State, decode, encode
+from protocol.messages import (
+    AnyBody,
+    Authority,
+    Deployment,
+    Envelope,
+    Heartbeat,
+    Intent,
+    MemberWay,
+    Motion,
+    Placement,
+    Point,
+    Progress,
+    State,
+    decode,
+    encode,
+)
 from tests.agents.life import Life
 
 START = (1.0, 1.0)
@@ -37,39 +54,76 @@ def plan(relay: Point = (2.0, 2.0), spare: Point = (3.0, 3.0), edges: Any = CHAI
 
 
 class Oracle:
-    """Gives the plan that the test has put there."""
+    """Gives the plan that the test has put there, and a motion straight to it in two stages."""
 
     def __init__(self) -> None:
         self.answer = plan()
-        self.asked: list[tuple[Point, tuple[Point, ...], dict[str, Point], Plan | None]] = []
+        self.asked: list[Question] = []
+        self.reason = ""
 
-    def plan(
-        self, agent: Point, agent_path: Sequence[Point], robots: Mapping[str, Point], previous: Plan | None
-    ) -> Plan:
-        self.asked.append((agent, tuple(agent_path), dict(robots), previous))
-        return self.answer
+    def plan(self, question: Question) -> Answer:
+        self.asked.append(question)
+        onset = question.onset
+        goals = {place.robot: place.position for place in self.answer.placements if place.robot in onset.places}
+        if goals == question.heading:
+            return Answer(self.answer, None)
+        ways = [
+            MemberWay(member="base", radius_m=0.0, speed_m_s=1.0, waypoints=(onset.places["base"],), stages=(0,) * 3)
+        ]
+        for name, goal in goals.items():
+            start = onset.places[name]
+            middle = (0.5 * (start[0] + goal[0]), 0.5 * (start[1] + goal[1]))
+            waypoints, stages = ((start, middle, goal), (0, 1, 2)) if start != goal else ((start,), (0, 0, 0))
+            ways.append(MemberWay(member=name, radius_m=0.2, speed_m_s=1.0, waypoints=waypoints, stages=stages))
+        motion = Motion(plan=0, revision=0, first_stage=0, released=-1, ways=tuple(ways), connection="none")
+        return Answer(self.answer, Course(onset.continued(motion), goals, True, self.reason))
 
 
 class Team(Life):
-    """A base station, a planner, and peers that speak when the test says so."""
+    """A base station, a planner, and peers that speak when the test says so.
+
+    The robots hear every deployment and obey it at once: what is released they have finished when they speak next.
+    """
 
     def __init__(self, mission: Mission, corner: Environment) -> None:
         self.oracle = Oracle()
+        self.speaking: dict[str, Point] = {"agent": (8.0, 2.0), "robot1": (1.0, 2.0), "robot2": (1.0, 3.0)}
+        self.progress: dict[str, Progress] = {}
+        self.refusing: dict[str, str] = {}
+        self.deaf: set[str] = set()
+        self.obeying: Authority | None = None
         super().__init__(BaseStation(mission, corner, self.oracle), START)
-        self.speaking = {"agent": (8.0, 2.0), "robot1": (1.0, 2.0), "robot2": (1.0, 3.0)}
         self.goal: Point | None = None
         self.planning_takes_s = 0.02
         self.fails = ""
 
     def speak(self) -> None:
-        for peer, place in self.speaking.items():
-            body: AnyBody = State(position=place, velocity=(0.0, 0.0), mode="moving")
+        for peer, place in list(self.speaking.items()):
+            body: AnyBody = State(
+                position=place, velocity=(0.0, 0.0), mode="moving", obeying=self.obeying,
+                progress=self.progress.get(peer), refusing=self.refusing.get(peer, ""),
+            )  # fmt: skip
             if peer == "agent":
                 path = () if self.goal is None else (place, self.goal)
                 body = Intent(position=place, velocity=(0.0, 0.0), mode="moving", goal=self.goal, path=path)
             kind = "intent" if peer == "agent" else "state"
             envelope = Envelope(sender=peer, incarnation=0, sequence=0, sent_at_s=0.0, body=body)
             self.hear(Heard(Address("team", peer, kind), envelope))
+
+    def obey(self, deployment: Deployment) -> None:
+        self.obeying, motion = deployment.authority, deployment.motion
+        if motion is None:
+            self.progress.clear()
+            return
+        for way in motion.ways:
+            if way.member not in self.speaking or way.member in self.deaf:
+                continue
+            end = max(motion.released + 1 - motion.first_stage, 0)
+            self.speaking[way.member] = way.waypoints[way.stages[end]]
+            self.progress[way.member] = Progress(
+                epoch=deployment.authority.epoch, plan=motion.plan, revision=motion.revision,
+                finished=motion.released + 1,
+            )  # fmt: skip
 
     def go_on(self, seconds: float) -> None:
         """Let time pass; everybody speaks ten times a second, and jobs end when they should."""
@@ -84,14 +138,23 @@ class Team(Life):
             self.live_until(step_ends_s)
 
     def do(self, effects: Sequence[Effect]) -> None:
+        said = len(self.said)
         super().do(effects)
+        for _, body in self.said[said:]:
+            if isinstance(body, Deployment):
+                self.obey(body)
         if any(isinstance(effect, Compute) for effect in effects):
             assert len(self.jobs) == 1
             self.began_s = self.now_s
 
     @property
     def deployments(self) -> list[tuple[float, Deployment]]:
-        return self.all_said(Deployment)
+        """Those that send somebody somewhere."""
+        return [(time_s, said) for time_s, said in self.all_said(Deployment) if said.motion is not None]
+
+    @property
+    def motions(self) -> list[Motion]:
+        return [said.motion for _, said in self.deployments if said.motion is not None]
 
     @property
     def decisions(self) -> list[Decision]:
@@ -109,15 +172,23 @@ def team(mission: Mission, corner: Environment) -> Team:
 
 def test_first_deployment_goes_out_as_soon_as_everybody_is_heard(team: Team) -> None:
     team.go_on(0.3)
-    assert team.deployments[0][0] == pytest.approx(0.02)
-    assert team.oracle.asked[0] == ((8.0, 2.0), (), {"robot1": (1.0, 2.0), "robot2": (1.0, 3.0)}, None)
+    hold, first = team.all_said(Deployment)[0], team.deployments[0]
+    assert hold[1].motion is None
+    assert hold[0] == 0.0
+    assert first[0] == pytest.approx(0.12)  # everybody has said by then that it stands
+    question = team.oracle.asked[0]
+    assert question.way == ((8.0, 2.0),)
+    assert question.onset.places == {"base": START, "robot1": (1.0, 2.0), "robot2": (1.0, 3.0)}
+    assert question.lost == {}
 
 
 def test_first_deployment_waits_for_latecomers_but_not_for_ever(team: Team) -> None:
     del team.speaking["robot2"]
     team.go_on(3.0)
     assert team.deployments[0][0] == pytest.approx(GRACE_S, abs=0.13)
-    assert set(team.oracle.asked[0][2]) == {"robot1"}
+    assert set(team.oracle.asked[0].onset.places) == {"base", "robot1"}
+    # It may stand where it is to start from.
+    assert {name: way.tolist() for name, way in team.oracle.asked[0].lost.items()} == {"robot2": [[1.0, 3.0]]}
 
 
 def test_nothing_is_planned_without_an_agent(team: Team) -> None:
@@ -141,7 +212,7 @@ def test_a_decision_that_stands_is_repeated_with_a_rising_sequence(team: Team, m
 
 def test_the_plan_before_is_given_to_the_planner(team: Team) -> None:
     team.go_on(1.2)
-    assert [asked[3] for asked in team.oracle.asked[:2]] == [None, team.oracle.answer]
+    assert [asked.previous for asked in team.oracle.asked[:2]] == [None, team.oracle.answer]
 
 
 def test_spares_that_move_are_no_new_decision(team: Team) -> None:
@@ -169,7 +240,7 @@ def test_plans_at_once_when_the_agent_has_a_new_goal(team: Team) -> None:
     team.goal = (9.0, 1.0)
     team.go_on(0.1)
     assert len(team.oracle.asked) == before + 1
-    assert team.oracle.asked[-1][1] == ((8.0, 2.0), (9.0, 1.0))
+    assert team.oracle.asked[-1].way == ((8.0, 2.0), (9.0, 1.0))
 
 
 @pytest.mark.parametrize("vanishes", [True, False])
@@ -180,15 +251,91 @@ def test_plans_without_a_robot_that_is_lost_and_with_it_when_it_is_back(
     place = team.speaking.pop("robot1")
     if vanishes:
         team.hear(PeerVanished("robot1"))
-        team.go_on(0.1)
+        team.go_on(0.3)
     else:
-        team.go_on(silence_s(mission.control_hz) + 0.2)
-    assert set(team.oracle.asked[-1][2]) == {"robot2"}
+        team.go_on(silence_s(mission.control_hz) + 0.4)
+    question = team.oracle.asked[-1]
+    assert set(question.onset.places) == {"base", "robot2"}
+    assert (question.onset.plan, question.onset.revision) == (1, 0)
+    assert question.lost["robot1"][0].tolist() == list(place)
     assert not team.connectivity.team_connected
     team.speaking["robot1"] = place
-    team.go_on(0.1)
-    assert set(team.oracle.asked[-1][2]) == {"robot1", "robot2"}
+    team.go_on(0.4)
+    assert set(team.oracle.asked[-1].onset.places) == {"base", "robot1", "robot2"}
+    assert team.oracle.asked[-1].lost == {}
+    assert team.motions[-1].plan == 2
     assert [line.level for line in team.logs].count("warning") == 1
+
+
+def test_between_two_plans_everybody_holds(team: Team) -> None:
+    team.go_on(3.0)
+    team.hear(PeerVanished("robot1"))
+    team.speaking.pop("robot1")
+    team.go_on(1.0)
+    plans = [None if said.motion is None else said.motion.plan for _, said in team.all_said(Deployment)]
+    assert list(dict.fromkeys(plans)) == [None, 0, 1]
+    hold = plans.index(None, plans.index(0))
+    assert plans[hold - 1] == 0
+    assert plans[hold + 1] in (None, 1)
+
+
+def test_a_robot_that_refuses_ends_the_plan_and_nothing_of_it_is_released(team: Team) -> None:
+    team.go_on(1.0)
+    team.deaf, team.refusing = {"robot2"}, {"robot2": "it is too far"}
+    team.oracle.answer = plan(spare=(4.0, 4.0))
+    before = team.motions[-1]
+    team.go_on(0.5)
+    assert [line.text for line in team.logs if line.level == "warning"] == [
+        "robot2 refuses revision 1 of plan 0: it is too far: everybody holds, then a new plan begins"
+    ]
+    refused = [motion for motion in team.motions if motion.revision == 1]
+    assert refused
+    assert {motion.released for motion in refused} == {before.released}
+    team.deaf, team.refusing = set(), {}
+    team.go_on(1.0)
+    assert team.motions[-1].plan == 1
+    assert team.speaking["robot2"] == (4.0, 4.0)
+
+
+def test_a_robot_that_does_not_answer_is_asked_again_and_then_given_another_plan(team: Team) -> None:
+    team.go_on(1.0)
+    team.deaf = {"robot2"}
+    team.oracle.answer = plan(spare=(4.0, 4.0))
+    team.go_on(1.5)
+    times_s = [time_s for time_s, said in team.deployments if said.motion and said.motion.revision == 1]
+    assert max(b - a for a, b in pairwise(times_s)) <= AGAIN_S + 1e-6
+    team.go_on(2.0)
+    assert "robot2 has not accepted a revision for 2 s" in team.logs[-1].text
+
+
+def test_releases_as_robots_progress_and_not_more_often_than_it_must(team: Team) -> None:
+    team.go_on(10.0)
+    times_s = [time_s for time_s, _ in team.all_said(Deployment)]
+    assert min(b - a for a, b in pairwise(times_s)) >= PACE_S - 1e-6
+    released = [motion.released for motion in team.motions]
+    assert released == sorted(released)
+    assert released[-1] == 1
+    assert team.speaking["robot1"] == (2.0, 2.0)
+    states = [state for _, state in team.all_said(State)]
+    assert states[-1].progress == Progress(epoch=0, plan=0, revision=0, finished=2)
+
+
+def test_a_motion_that_leads_to_the_goals_is_not_planned_again(team: Team) -> None:
+    team.go_on(5.0)
+    assert team.oracle.asked[0].heading == {}
+    assert team.oracle.asked[-1].heading == {"robot1": (2.0, 2.0), "robot2": (3.0, 3.0)}
+    assert {motion.revision for motion in team.motions} == {0}
+    assert sum(isinstance(record, Ordered) for record in team.records) == 1
+
+
+def test_nothing_is_released_while_a_revision_is_planned(team: Team) -> None:
+    team.planning_takes_s = 0.35
+    relays = [(2.0, 2.0), (4.0, 4.0), (2.0, 4.0), (4.0, 2.0)]
+    for relay in relays:
+        team.oracle.answer = plan(relay=relay)
+        team.go_on(1.0)
+    for before, after in pairwise(team.motions):
+        assert after.revision == before.revision or after.released == before.released
 
 
 def test_one_job_at_a_time_however_long_it_takes(team: Team) -> None:
@@ -239,7 +386,7 @@ def test_an_incarnation_that_starts_later_outranks_those_before(mission: Mission
     for start_s in (0.0, 7.5):
         role = BaseStation(mission, corner, Oracle())
         role.start(start_s, START)
-        epochs.append(role._epoch)
+        epochs.append(role._authority.epoch)
     assert epochs[0] < epochs[1]
 
 
@@ -253,7 +400,7 @@ def test_says_where_it_is_and_that_it_lives(team: Team) -> None:
 
 def test_connectivity_is_true_line_of_sight_between_the_places_heard(team: Team) -> None:
     team.speaking = {"agent": (2.0, 9.0), "robot1": (9.0, 2.0), "robot2": (2.0, 2.0)}
-    team.oracle.answer = plan(edges=(("base", "robot1"), ("robot1", "agent")))
+    team.oracle.answer = plan((9.0, 2.0), (2.0, 2.0))
     team.go_on(0.5)
     seen = team.connectivity
     # Everybody sees everybody but agent and robot1: the complete graph less one link has λ2 = n − 2.
@@ -270,6 +417,7 @@ def test_visible_is_less_than_connected(mission: Mission, corner: Environment) -
     team.role._position = (9.0, 4.0)  # type: ignore[attr-defined]
     team.driver = type(team.driver)((9.0, 4.0), 0.0)
     team.speaking = {"agent": (2.0, 9.0), "robot1": (4.0, 9.0), "robot2": (3.0, 9.0)}
+    team.oracle.answer = plan((4.0, 9.0), (3.0, 9.0))
     team.go_on(0.5)
     seen = team.connectivity
     assert (seen.agent_visible, seen.chain_connected, seen.team_connected) == (True, False, False)

@@ -91,7 +91,7 @@ def test_the_fixed_search_pays_for_the_relays_that_it_keeps_alone() -> None:
     """Two relays where one does: both may be put in one place, and then only one of them is sent, and paid for."""
     planner = DeploymentPlanner(HOOK, (1.0, 1.0), RADIUS_M, "inflection", placements="points", search="fixed")
     graph = planner.graph
-    proposer = Proposer(graph, (1.0, 1.0), "fixed", robot_speed_m_s=1.0, agent_speed_m_s=1.0)
+    proposer = Proposer(graph, (1.0, 1.0), "fixed", robot_speed_m_s=1.0, agent_speed_m_s=1.0, apart_m=0.1)
     robots = {"robot1": (10.0, 1.0), "robot2": (18.5, 1.0), "robot3": (1.0, 5.0)}
     found = 0
     for standing in permutations(robots):
@@ -110,7 +110,7 @@ def test_the_fixed_search_pays_for_the_relays_that_it_keeps_alone() -> None:
 def test_no_chain_of_the_named_kind_costs_less_than_the_bound(search: Search) -> None:
     """And the reason names the kind: in sight of the agent on all its way, or when it has arrived there."""
     graph = _planner("points", "chain").graph
-    proposer = Proposer(graph, BASE, search, robot_speed_m_s=1.4, agent_speed_m_s=0.9)
+    proposer = Proposer(graph, BASE, search, robot_speed_m_s=1.4, agent_speed_m_s=0.9, apart_m=0.1)
     whole = partial = cheaper = 0
     for seed in range(6):
         here, there, *starts = _places(6, 70 + seed)

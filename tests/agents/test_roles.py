@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from agents.base_station import BaseStation
 from agents.behaviour import begin
+from agents.casting import Casting
 from agents.certificate_judge import certificate_judge
-from agents.leader import DeploymentPlanner
 from agents.robot import Robot
 from agents.role import Heard, JobDone, Role
 from agents.tracked_agent import TrackedAgent
@@ -106,7 +106,7 @@ events = st.lists(st.tuples(st.one_of(st.tuples(names, bodies), comings), st.flo
 
 
 def make_base() -> Role:
-    return BaseStation(MISSION, CORNER, DeploymentPlanner(CORNER, (1.0, 1.0), 0.2, "inflection"))
+    return Casting(MISSION, CORNER).cast("base")[0]
 
 
 def make_robot() -> Role:
