@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 
 
@@ -21,6 +23,7 @@ def exercise() -> None:
     from planning.motion import plan_motion
     from planning.motion_plan import Schedule, TimedPath
     from planning.mutual_visibility import mutual_visibility
+    from planning.no_schedule import NoSchedule
     from planning.ordered_chain import search_in_order
     from planning.placement import reachable_positions
     from planning.placement_graph import PlacementGraph
@@ -55,6 +58,10 @@ def exercise() -> None:
     two = Schedule(["a", "b"], [TimedPath(points[:2], [0.0, 1.0]), TimedPath.standing(points[2])], 0.2)
     certify(two, rooms)
     schedule([points[2:3], [(8.0, 4.0), (1.0, 4.0)], [(10.0, 4.0), (17.0, 4.0)]], 0.2, rooms)
+    # Going on together ends nowhere here: the order has to be searched for. And there it is not possible at all.
+    schedule([[(1, 2), (0, 2), (3, 2)], [(2, 3), (1, 2)], [(0, 3), (2, 2), (2, 3)]], 0.3)
+    with suppress(NoSchedule):
+        schedule([[(2.0, 4.0)], [(9.0, 4.0), (12.0, 4.0), (12.0, 7.0)]], 0.2, rooms)
     crossing = [[(8.0, 4.0), (1.0, 4.5)], [(7.0, 6.0), (7.0, 5.0), (10.0, 4.0)]]
     grid_schedule(crossing, np.full(2, 0.2), rooms, members=["a", "b"], speed_m_s=np.ones(2))
     certify(Schedule(two.members, two.paths, 0.2, stages=[(0, 1), (0, 0)]), rooms, links=[("a", "b")], ends=("a", "b"))
