@@ -27,8 +27,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 ArrivingWay = Literal["direct", "detour", "stepwise", "bridge"]
 
-EFFORT: Final = 100_000
-"""Moves that a search looks at, at most."""
+EFFORT: Final = 2000
+"""Deployments that a search goes on from, at most."""
 
 OTHER_SCHEDULES: Final = 2
 """So many schedules are tried on paths of other classes."""
@@ -41,7 +41,7 @@ class Attempts:
         task: who is to go where.
         placements: places to stop at; None: some are chosen if needed.
         yielding: names of those that start at their goals and may step aside.
-        effort: moves that each search looks at, at most.
+        effort: deployments that each search goes on from, at most.
 
     Attributes:
         reason: why the first attempt failed; empty if it did not.

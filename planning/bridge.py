@@ -28,7 +28,7 @@ def cross_bridge(steps: Steps, level: Level, effort: int) -> Ints | None:
     Args:
         steps: the team on its roadmap.
         level: who has to be joined; at the start and at the goals they are.
-        effort: moves to look at, at most, in all.
+        effort: deployments to go on from, at most, in all.
     """
     each = max(1, effort // (2 + len(SHARES)))
     hub = np.full(len(steps.starts), steps.hub())

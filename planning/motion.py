@@ -105,13 +105,14 @@ def plan_motion(
         yielding: members that start at their goals, and may step aside for others and come back.
         may_part: whether the connection may break so that everybody gets to its goal; else the best effort that keeps
             it.
-        effort: moves of single robots that each search looks at, at most.
+        effort: deployments that each search goes on from, at most.
 
     Raises:
         InvalidSchedule: names, places, radii or speeds do not fit together.
         NotInFreeSpace: somebody is to set out from where it cannot be.
 
-    Complexity: that of a schedule for the direct way; up to a few times that and O(effort · k) besides for the others.
+    Complexity: that of a schedule for the direct way; up to a few times that and O(effort · k² d) besides for d moves
+        of a robot at a place.
     """
     task = read_task(env, starts, goals, radius_m, members, speed_m_s, joined, unscheduled or {}, obstacles, geodesics)
     attempts = Attempts(task, placements, yielding, effort)

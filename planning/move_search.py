@@ -5,9 +5,9 @@ allowed if the mover's disc keeps clear of all others on the way, and the networ
 the mover's links that hold on the whole edge joins whom it should. So a robot moves while it is not an articulation
 point of the network, and also while it is one but stays in sight of all that it holds together.
 
-The search is best first, by the way gone and, weighed more, the ways that are left; it ends at the goals, or when it has
-looked at a given number of moves, with the deployment nearest to the goals. Moves can be taken back, so nothing is lost
-by a bad one but time.
+The search is best first, by the way gone and, weighed more, the ways that are left; it ends at the goals, or after a
+given number of deployments, with the one nearest to the goals. Moves can be taken back, so nothing is lost by a bad one
+but time.
 
 E. Stump, N. Michael, V. Kumar, V. Isler, Visibility-based deployment of robot formations for communication maintenance,
 2011, doi:10.1109/ICRA.2011.5980179, for searching deployments; the articulation point rule is folklore.
@@ -80,10 +80,10 @@ def search_moves(roadmap: TeamRoadmap, crew: Crew, goals: Ints, effort: int, gre
         roadmap: the places.
         crew: who is where.
         goals: (m,) int, m ≤ k: where the first m members are to go. The others stand.
-        effort: moves to look at, at most.
+        effort: deployments to go on from, at most.
         greed: see :data:`GREED`; 1 finds a shortest plan on the roadmap if the effort is enough.
 
-    Complexity: O(effort · (k + log effort)).
+    Complexity: O(effort · (m d k + log)) for d edges at a place.
     """
     m = len(goals)
     to_go = roadmap.lengths_to(goals.tolist())
@@ -206,19 +206,19 @@ def _search(
     adjacent, trial = np.zeros(k + path_sees.shape[0], np.int64), np.zeros(k + path_sees.shape[0], np.int64)
     known[0, :m], known[0, m] = state, -1
     slots[_find_slot(state, known, slots)] = 0
-    count, looked = 1, 0
+    count, expanded = 1, 0
     best, least = 0, _sum_ways(state, to_go)
     # Of two that promise the same, the one found last.
     queue = [(greed * least, 0, 0.0)]
-    while len(queue) > 0 and looked < effort and least > 0.0:
+    while len(queue) > 0 and expanded < effort and least > 0.0:
         _, minus_row, gone = heapq.heappop(queue)
         row = -minus_row
+        expanded += 1
         for i in range(m):
             at[i] = state[i] = known[row, i]
         _look_around(at, visible, path_sees, path_links, adjacent)
         for i in range(m):
             u = at[i]
-            looked += starts[u + 1] - starts[u]
             for e in edges_at[starts[u] : starts[u + 1]]:
                 v = edges[e, 0] + edges[e, 1] - u
                 state[i] = v
