@@ -39,7 +39,7 @@ PATHS = ("#16856b", "#7b3fa0", "#1478c8", "#a8541c", "#c2187f", "#5d7a12", "#0f8
 
 _LINKS_BEFORE = "#c4a27a"
 _LEAST_PT = 13.0
-"""Length of a piece of path from which on its stage's number is written beside it."""
+"""Length of a piece of path from which on its stages are written beside it."""
 _HEAD_PT = 16.0
 """Of path that the head at its end points along."""
 _ROW_IN = 0.24
@@ -68,7 +68,7 @@ def draw_motion(
         title: one line above the picture.
         links_before: lines of sight before anybody moves.
 
-    A path is cut by a bar where a stage ends; its numbers are those of stages in which its member moves.
+    A bar across a path is where its member stops and waits; numbers are those of the stages in which it moves.
 
     Raises:
         BadPicture: the file has another suffix or cannot be written.
@@ -77,7 +77,8 @@ def draw_motion(
 
     moves = order_moves(schedule)
     moving = list(dict.fromkeys(sorted(move.member for move in moves)))
-    colours = {member: PATHS[place % len(PATHS)] for place, member in enumerate(moving)}
+    robots = [member for member in moving if not markers[schedule.members[member]].startswith("A")]
+    colours = dict.fromkeys(moving, AGENT) | {member: PATHS[place % len(PATHS)] for place, member in enumerate(robots)}
     figure, axes = draw_floor(environment, polygons, file, title)
     for ends, colour, style, width, label in (
         (links_before, _LINKS_BEFORE, (0, (1.5, 1.5)), 1.4, "lines of sight before"),
@@ -96,12 +97,12 @@ def draw_motion(
     if moves:
         chart_in = _ROW_IN * len(moving)
         chart = figure.add_axes((0.06, -(chart_in + 1.05) / height_in, 0.92, chart_in / height_in))
-        _draw_order(chart, schedule, moves, [(member, markers[schedule.members[member]]) for member in moving], colours)
+        _draw_order(chart, schedule, moves, colours)
     write_picture(figure, file)
 
 
 def _draw_path(axes: Axes, schedule: Schedule, member: int, moves: Sequence[Move], colour: str) -> None:
-    """A line with a head at its end, bars where a stage's piece ends, and the stages' numbers where there is room."""
+    """A line with a head at its end, bars where the member waits, and stages where there is room."""
     from matplotlib.patches import Circle
 
     path = leave_out_stops(schedule.paths[member].waypoints)
@@ -115,13 +116,14 @@ def _draw_path(axes: Axes, schedule: Schedule, member: int, moves: Sequence[Move
         radius = float(schedule.radii_m[member])
         axes.add_patch(Circle((end[0], end[1]), radius, facecolor=colour, alpha=alpha, linewidth=0, zorder=4.3))
     points_per_m = float(np.ptp(axes.transData.transform([(0, 0), (1, 0)])[:, 0])) * 72.0 / axes.figure.dpi
-    axes.annotate(
-        "", find_place(covered[-1]), find_place(covered[-1] - _HEAD_PT / points_per_m), zorder=4.5,
-        arrowprops={"arrowstyle": "-|>", "color": colour, "linewidth": 1.8, "shrinkA": 0, "shrinkB": 6},
-    )  # fmt: skip
+    if covered[-1] * points_per_m > _HEAD_PT:  # else markers hide it
+        axes.annotate(
+            "", find_place(covered[-1]), find_place(covered[-1] - _HEAD_PT / points_per_m), zorder=4.5,
+            arrowprops={"arrowstyle": "-|>", "color": colour, "linewidth": 1.8, "shrinkA": 0, "shrinkB": 6},
+        )  # fmt: skip
     for move in moves:
         middle, end = move.from_m + 0.5 * move.length_m, move.from_m + move.length_m
-        if move.stage != moves[-1].stage:
+        if move is not moves[-1]:
             before = max(int(np.searchsorted(covered, end)) - 1, 0)
             dx, dy = path[before + 1] - path[before]
             turn = math.degrees(math.atan2(dy, dx))
@@ -132,10 +134,15 @@ def _draw_path(axes: Axes, schedule: Schedule, member: int, moves: Sequence[Move
             before = int(np.searchsorted(covered, middle)) - 1
             dx, dy = (path[before + 1] - path[before]) / (covered[before + 1] - covered[before])
             axes.annotate(
-                str(move.stage), find_place(middle), (-6.5 * dy, 6.5 * dx), textcoords="offset points", color=colour,
+                _name_stages(move), find_place(middle), (-6.5 * dy, 6.5 * dx), textcoords="offset points", color=colour,
                 fontsize=7.5, weight="bold", ha="center", va="center_baseline", zorder=4.9,
                 bbox={"boxstyle": "round,pad=0.08", "facecolor": "white", "edgecolor": "none", "alpha": 0.75},
             )  # fmt: skip
+
+
+def _name_stages(move: Move) -> str:
+    first, last = move.stages
+    return str(first) if first == last else f"{first}–{last}"
 
 
 def _draw_members(axes: Axes, schedule: Schedule, markers: Mapping[str, str], colours: Mapping[int, str]) -> None:
@@ -165,25 +172,23 @@ def _draw_members(axes: Axes, schedule: Schedule, markers: Mapping[str, str], co
         named.add(kind)
 
 
-def _draw_order(
-    axes: Axes, schedule: Schedule, moves: Sequence[Move], rows: Sequence[tuple[int, str]], colours: Mapping[int, str]
-) -> None:
-    """One row for each member that moves; bars from when it sets off to when it is there, each with its stage."""
-    row = {member: place for place, (member, _) in enumerate(rows)}
+def _draw_order(axes: Axes, schedule: Schedule, moves: Sequence[Move], colours: Mapping[int, str]) -> None:
+    """One row for each member that moves; bars from when it sets off to when it is there, each with its stages."""
+    row = {member: place for place, member in enumerate(colours)}
     span = schedule.end_s - schedule.start_s
     for move in moves:
         axes.barh(
             row[move.member], move.end_s - move.begin_s, left=move.begin_s, height=0.72, color=colours[move.member],
             edgecolor="white", linewidth=0.8,
         )  # fmt: skip
-        if move.end_s - move.begin_s > 0.012 * span * len(str(move.stage)):
+        if move.end_s - move.begin_s > 0.012 * span * len(_name_stages(move)):
             axes.annotate(
-                str(move.stage), (0.5 * (move.begin_s + move.end_s), row[move.member]), color="white", fontsize=7,
+                _name_stages(move), (0.5 * (move.begin_s + move.end_s), row[move.member]), color="white", fontsize=7,
                 weight="bold", ha="center", va="center_baseline",
             )  # fmt: skip
     axes.set_xlim(schedule.start_s, schedule.end_s + 0.01 * span)
-    axes.set_ylim(len(rows) - 0.45, -0.55)
-    axes.set_yticks(range(len(rows)), [f"robot {text}" if text.isdigit() else text for _, text in rows])
+    axes.set_ylim(len(row) - 0.45, -0.55)
+    axes.set_yticks(range(len(row)), [schedule.members[member] for member in row])
     axes.tick_params(labelsize=8, length=0)
     axes.tick_params(axis="x", length=3)
     axes.set_xlabel(

@@ -1,8 +1,8 @@
-"""The order of moves of a schedule: who goes how far in which stage, when, and who waits for whom."""
+"""The order of moves of a schedule: who goes how far, when, in which stages, and who waits for whom."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +17,11 @@ _AT_ONCE_S = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Move:
-    """What a member drives in one stage.
+    """What a member drives without a stop.
 
     Attributes:
         member: its row in the schedule.
-        stage: counted from 1.
+        stages: the first and the last one in which it does, counted from 1.
         length_m: of this piece of its path.
         from_m: of its path driven before.
         begin_s: when it sets off if nobody is late.
@@ -31,7 +31,7 @@ class Move:
     """
 
     member: int
-    stage: int
+    stages: tuple[int, int]
     length_m: float
     from_m: float
     begin_s: float
@@ -52,30 +52,32 @@ def leave_out_stops(waypoints: Floats) -> Floats:
 
 
 def order_moves(schedule: Schedule) -> list[Move]:
-    """All moves of a schedule, by stage and then by member. A schedule without stages is one stage.
+    """All moves of a schedule, in the order in which they begin. A schedule without stages is one stage.
 
     Complexity: O(k n + m) for k members, n stages and m waypoints.
     """
     count = max(schedule.stage_count, 1)
     begins, ends, lengths = _measure_stages(schedule, count)
-    covered = np.cumsum(lengths, axis=1) - lengths
     # When each member has finished all its moves up to a stage; standing still is finished at once.
     finished = np.maximum.accumulate(np.where(lengths > 0.0, ends, schedule.start_s), axis=1)
-    moves = []
-    for stage, member in np.argwhere(lengths.T > 0.0).tolist():
-        begin = float(begins[member, stage])
-        waits = begin - float(finished[member, stage - 1] if stage else schedule.start_s)
-        others: tuple[int, ...] = ()
-        if waits > _AT_ONCE_S and stage >= 2:
-            before = finished[:, stage - 2]
-            others = tuple(np.flatnonzero(before >= before.max() - _AT_ONCE_S).tolist())
-        moves.append(
-            Move(
-                member, stage + 1, float(lengths[member, stage]), float(covered[member, stage]), begin,
-                float(ends[member, stage]), waits if waits > _AT_ONCE_S else 0.0, others,
-            )
-        )  # fmt: skip
-    return moves
+    moves: list[Move] = []
+    for member in range(len(schedule)):
+        last: Move | None = None
+        for stage in np.flatnonzero(lengths[member] > 0.0).tolist():
+            begin, end, length = (float(of[member, stage]) for of in (begins, ends, lengths))
+            waits = begin - (schedule.start_s if last is None else last.end_s)
+            if last is not None and waits <= _AT_ONCE_S:
+                moves.pop()
+                last = replace(last, stages=(last.stages[0], stage + 1), length_m=last.length_m + length, end_s=end)
+            else:
+                others: tuple[int, ...] = ()
+                if waits > _AT_ONCE_S and stage >= 2:
+                    before = finished[:, stage - 2]
+                    others = tuple(np.flatnonzero(before >= before.max() - _AT_ONCE_S).tolist())
+                driven = 0.0 if last is None else last.from_m + last.length_m
+                last = Move(member, (stage + 1, stage + 1), length, driven, begin, end, max(waits, 0.0), others)
+            moves.append(last)
+    return sorted(moves, key=lambda move: (move.begin_s, move.member))
 
 
 def _measure_stages(schedule: Schedule, count: int) -> tuple[Floats, Floats, Floats]:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from protocol.messages import Point
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 
 EXACT_COUNT = 8
@@ -70,6 +71,7 @@ class MovePlan:
     Attributes:
         placements: for each robot the placement it is to go to; None for one that idles.
         targets: where those are.
+        tree: who is to see whom: base station, agents and robots are counted in this order, from 0.
         links: the two ends of each line of sight.
         movement: what going there costs, in metres or seconds.
         virtual: what the links cost, without unit.
@@ -79,6 +81,7 @@ class MovePlan:
 
     placements: tuple[int | None, ...]
     targets: tuple[Point | None, ...]
+    tree: Links
     links: tuple[tuple[Point, Point], ...]
     movement: float
     virtual: float
@@ -209,7 +212,8 @@ class Terminals:
             placements[robot] = int(node)
         moved = float(movement[chosen, relays].sum())
         links, cost = self._ordered(tree).links, moved + mu * tree.cost
-        return MovePlan(tuple(placements), self._places_of(placements), links, moved, tree.cost, cost, None)
+        topology = self._labelled(tree, chosen, relays)
+        return MovePlan(tuple(placements), self._places_of(placements), topology, links, moved, tree.cost, cost, None)
 
     def redeploy(
         self,
@@ -258,6 +262,7 @@ class Terminals:
         return MovePlan(
             tuple(cells[t:]),
             places[t:],
+            tuple((u, v) for u, v in found.tree.tolist()),
             tuple((here, there) for here, there in links if here is not None and there is not None),
             moved,
             virtual,
@@ -270,17 +275,21 @@ class Terminals:
 
         A tree of little cost, the robots nearest to its places, and the others beside the base station.
         """
-        t, k = len(self.nodes), len(movement)
         tree = steiner_tree(self.weights, self.nodes, "takahashi-matsuyama", None, self._standing)
         relays = tree.nodes[tree.nodes < len(self._graph)]
         try:
             chosen = identify_robots(movement[:, relays])
         except TooFewRobots:
             return None
+        t, k = len(self.nodes), len(movement)
+        spare = sorted({*range(t, t + k)} - {t + int(robot) for robot in chosen})
+        return (*self._labelled(tree, chosen, relays), *((0, robot) for robot in spare))
+
+    def _labelled(self, tree: Tree, chosen: Ints, relays: Ints) -> Links:
+        """The edges of a tree between terminals and, counted on from these, the robots chosen for its relays."""
         label = {int(node): terminal for terminal, node in enumerate(self.nodes)}
-        label |= {int(node): t + int(robot) for robot, node in zip(chosen, relays, strict=True)}
-        spare = sorted({*range(t, t + k)} - {*label.values()})
-        return (*((label[u], label[v]) for u, v in tree.edges.tolist()), *((0, robot) for robot in spare))
+        label |= {int(node): len(self.nodes) + int(robot) for robot, node in zip(chosen, relays, strict=True)}
+        return tuple((label[u], label[v]) for u, v in tree.edges.tolist())
 
     def _places_of(self, nodes: Sequence[int | None]) -> tuple[Point | None, ...]:
         return tuple(None if node is None else self.place_of(node) for node in nodes)

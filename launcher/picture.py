@@ -35,7 +35,6 @@ SIGHT = "#e07b00"
 BASE = "#1f4e8c"
 RELAY = "#16856b"
 AGENT = "#b3262e"
-_MOVE = "#5b4b8a"
 IDLE = "#7a828c"
 
 
@@ -73,23 +72,18 @@ def draw_plan(
     links: Sequence[tuple[Point, Point]],
     file: Path,
     title: str,
-    *,
-    ways: Sequence[Sequence[Point]] = (),
 ) -> None:
-    """Draw a deployment: who stands where, the lines of sight that join them, and how robots get there.
+    """Draw a deployment: who stands where, and the lines of sight that join them.
 
     Args:
         environment: metres.
         polygons: cells, each (m, 2) float, metres; None draws none.
         base: where the base station stands.
         agents: where each tracked agent is.
-        relays: where each relay is to stand, numbered from 1 in this order; with ``ways`` their ends in their order.
+        relays: where each relay is to stand, numbered from 1 in this order.
         links: the two ends of each line of sight of the chain or tree.
         file: written as PNG, PDF or SVG, by its suffix.
         title: one line above the picture.
-        ways: of each robot, from where it is to where it is to go as a relay; a single point for one that idles.
-            Robots are numbered from 1 in this order, and the relays by their robots. None given: nothing is said of how
-            relays get there.
 
     Peers in one place are drawn beside each other, each joined to its place by a thin line.
 
@@ -101,14 +95,9 @@ def draw_plan(
     figure, axes = draw_floor(environment, polygons, file, title)
     axes.add_collection(LineCollection(list(links), colors=SIGHT, linewidths=2, zorder=4))
     axes.plot([], [], color=SIGHT, linewidth=2, label="line of sight")
-    _draw_ways(axes, [way for way in ways if len(way) > 1])
-    numbers = [str(number) for number in range(1, len(ways or relays) + 1)]
-    idle = {name: way[0] for name, way in zip(numbers, ways, strict=False) if len(way) == 1}
-    names = [name for name in numbers if name not in idle]
     kinds = [
         ("s", BASE, "base", [base], ["B"]),
-        ("o", RELAY, "relay", relays, names),
-        ("o", IDLE, "idle", [*idle.values()], [*idle]),
+        ("o", RELAY, "relay", relays, [str(number) for number in range(1, len(relays) + 1)]),
         ("D", AGENT, "agent", agents, ["A"] if len(agents) == 1 else [f"A{i}" for i in range(1, len(agents) + 1)]),
     ]
     places = np.array([place for *_, these, _ in kinds for place in these], dtype=float)
@@ -174,26 +163,6 @@ def draw_floor(
     for spine in axes.spines.values():
         spine.set_visible(False)
     return figure, axes
-
-
-def _draw_ways(axes: Axes, ways: Sequence[Sequence[Point]]) -> None:
-    """Dashed lines, with a head at the end of each."""
-    from matplotlib.collections import LineCollection
-
-    if not ways:
-        return
-    axes.add_collection(
-        LineCollection([way[:-1] for way in ways], colors=_MOVE, linewidths=1.2, linestyles="--", zorder=4.5)
-    )
-    for before, end in (way[-2:] for way in ways):
-        axes.annotate(
-            "", end, before, zorder=4.5,
-            arrowprops={
-                "arrowstyle": "-|>", "color": _MOVE, "linewidth": 1.2, "linestyle": "--", "shrinkA": 0, "shrinkB": 6
-            },
-        )  # fmt: skip
-    axes.plot(*np.array([way[0] for way in ways]).T, "o", color=_MOVE, markersize=4, zorder=4.5)
-    axes.plot([], [], color=_MOVE, linewidth=1.2, linestyle="--", label="movement")
 
 
 def spread_markers(axes: Axes, places: Floats) -> Floats:

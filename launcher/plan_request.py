@@ -13,6 +13,7 @@ from launcher.wording import counted
 
 if TYPE_CHECKING:
     from launcher.offline_plan import MovePlan, Need, Terminals
+    from launcher.planned_motion import PlannedMotion
     from launcher.ways import Line
     from planning.decomposition import Cells
     from planning.placement_graph import PlacementGraph
@@ -23,6 +24,10 @@ Method: TypeAlias = Literal["exact", "mst", "takahashi-matsuyama"]
 Search: TypeAlias = Literal["tree", "exact", "one-edge", "fixed", "chain"]
 """``tree``: the cheapest tree first, and then which robot goes to which of its places (thesis §3.4)."""
 Movement: TypeAlias = Literal["geodesic", "euclidean", "adjacency"]
+
+
+SPEED_M_S = 1.0
+"""Of robots that move, where nobody says."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +44,8 @@ class Moves:
     idle: bool = False
     links: Links = ()
     """The present tree, of nodes as in :mod:`launcher.present_tree`; none: not known."""
+    agents: tuple[Point, ...] = ()
+    """Where agents come from; none: they are where they are to be joined."""
 
     def check(self, agents: int) -> None:
         """Raise where options contradict each other.
@@ -48,6 +55,11 @@ class Moves:
         """
         if not self.robots and self != Moves():
             raise ScenarioFault("how robots move is asked, and not where they are: give --robot X,Y for each of them")
+        if self.agents and len(self.agents) != agents:
+            raise ScenarioFault(
+                f"--agent-from is given {counted(len(self.agents), 'time')} for {counted(agents, 'agent')}: give it "
+                "once for each, in their order, or not at all"
+            )
         if self.deadline_s is not None and self.speed_m_s is None:
             raise ScenarioFault("--deadline needs to know how fast robots are: give --speed, too")
         if self.jump_penalty_m and self.movement != "adjacency":
@@ -76,6 +88,9 @@ class Request:
     vertices: int | None = None
     moves: Moves = field(default_factory=Moves)
     tolerance_m: float | None = None
+    picture: Path | None = None
+    diagram: tuple[tuple[int, int], Path] | None = None
+    """Of which two, of nodes as in :mod:`launcher.present_tree`, and where it is written."""
 
     def check(self) -> None:
         """Raise where options contradict each other.
@@ -89,6 +104,8 @@ class Request:
             raise ScenarioFault("--vertices fixes the number of robots: leave out --robots and --robot")
         if self.vertices is not None and self.method != "exact":
             raise ScenarioFault("a tree of so many --vertices is always exact: leave out --method")
+        if self.diagram is not None and not self.moves.robots:
+            raise ScenarioFault("--diagram is of two that move: give --robot X,Y for each of them")
         if self.moves.robots and self.robots is not None:
             raise ScenarioFault("each --robot is one of the robots there are: leave out --robots")
         if self.moves.movement == "adjacency" and self.placements.kind == "points":
@@ -164,3 +181,29 @@ def send_robots(
         for robot, (start, placement) in enumerate(zip(moves.robots, plan.placements, strict=True))
     ]
     return plan, tuple(lines)
+
+
+def move_team(request: Request, plan: MovePlan, graph: PlacementGraph) -> PlannedMotion:
+    """How the team gets there, by the ways round walls whatever movement costs were counted by.
+
+    Raises:
+        ScenarioFault: a diagram is asked for of somebody who stays.
+    """
+    from launcher.planned_motion import PlannedMotion, Team
+
+    moves = request.moves
+    team = Team.sent(
+        request.base,
+        list(zip(moves.agents or request.agents, request.agents, strict=True)),
+        list(zip(moves.robots, plan.targets, strict=True)),
+        plan.tree, graph.radius_m, graph.environment, graph.free,
+    )  # fmt: skip
+    planned = PlannedMotion.of(team, graph.environment, graph.geodesics, moves.speed_m_s or SPEED_M_S)
+    still = [] if request.diagram is None else [team.names[row] for row in request.diagram[0] if planned.stays(row)]
+    if still:
+        movers = [name for row, name in enumerate(team.names) if not planned.stays(row)]
+        raise ScenarioFault(
+            f"{request.file}: a --diagram is of two that move, and {still[0]} stays where it is; choose two of "
+            f"{', '.join(movers) or 'other places'}"
+        )
+    return planned

@@ -27,7 +27,7 @@ def read_links(texts: Sequence[str], agents: int, robots: int, idle: bool) -> Li
     Raises:
         ScenarioFault: a name is unknown, or these links make no tree.
     """
-    names = {name: node for node, name in enumerate(_names(agents, robots))}
+    names = {name: node for node, name in enumerate(name_nodes(agents, robots))}
     part = list(range(len(names)))  # the least node of the part of the tree that each node is in
     links = []
     for text in texts:
@@ -48,6 +48,19 @@ def read_links(texts: Sequence[str], agents: int, robots: int, idle: bool) -> Li
     return tuple(links)
 
 
+def read_pair(text: str, agents: int, robots: int) -> tuple[int, int]:
+    """The two nodes of ``--diagram A-B``.
+
+    Raises:
+        ScenarioFault: a name is unknown, or the two are one.
+    """
+    names = name_nodes(agents, robots)
+    first, _, second = (word.strip() for word in text.partition("-"))
+    if first not in names or second not in names or first == second:
+        raise ScenarioFault(f"--diagram: '{text}' is no pair; write A-B with two of {', '.join(names)}")
+    return names.index(first), names.index(second)
+
+
 def line_up(agents: int, robots: int) -> Links:
     """The tree that is taken for the present one where none is given.
 
@@ -59,10 +72,11 @@ def line_up(agents: int, robots: int) -> Links:
 
 def name_links(links: Links, agents: int, robots: int) -> list[str]:
     """``A-B`` of each link."""
-    names = _names(agents, robots)
+    names = name_nodes(agents, robots)
     return [f"{names[u]}-{names[v]}" for u, v in links]
 
 
-def _names(agents: int, robots: int) -> list[str]:
+def name_nodes(agents: int, robots: int) -> list[str]:
+    """``base``, ``agent`` or ``agent1`` and so on, and the numbers of robots."""
     of_agents = ["agent"] if agents == 1 else [f"agent{number}" for number in range(1, agents + 1)]
     return ["base", *of_agents, *(str(number) for number in range(1, robots + 1))]

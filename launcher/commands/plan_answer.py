@@ -42,7 +42,7 @@ def find_crowds(request: Request, facts: dict[str, Any]) -> list[list[str]]:
     return [[name for name, _ in crowd] for crowd in crowds if len(crowd) > 1]
 
 
-def tell_tree(request: Request, facts: dict[str, Any], picture: Path | None) -> None:
+def tell_tree(request: Request, facts: dict[str, Any]) -> None:
     """Where relays stand."""
     spare = "" if facts["spares"] is None else f", {facts['spares']} to spare"
     tell(f"{_count(facts)}{spare}; virtual cost {facts['cost']:.3f}")
@@ -53,10 +53,9 @@ def tell_tree(request: Request, facts: dict[str, Any], picture: Path | None) -> 
         several = "" if len(numbers) == 1 else f"  and the next {len(numbers) - 1} there, too"
         tell(f"  relay {numbers[0]:<3} {x:8.3f}, {y:8.3f}{several}")
     _tell_places(_named_agents(request))
-    _tell_end(request, facts, picture)
 
 
-def tell_moves(request: Request, facts: dict[str, Any], picture: Path | None) -> None:
+def tell_moves(request: Request, facts: dict[str, Any]) -> None:
     """Who goes where, and what that costs."""
     cost, bound = facts["cost"], facts["lower_bound"]
     idle = sum(robot["to"] is None for robot in facts["robots"])
@@ -78,27 +77,29 @@ def tell_moves(request: Request, facts: dict[str, Any], picture: Path | None) ->
         (x, y), end = robot["from"], robot["to"]
         where = "idles" if end is None else f"to {end[0]:8.3f}, {end[1]:8.3f}"
         tell(f"  robot {number:<3} {x:8.3f}, {y:8.3f}  {where}")
-    _tell_end(request, facts, picture)
 
 
-def draw(
+def draw_tree(
     request: Request,
     facts: dict[str, Any],
     environment: Environment,
     polygons: Sequence[NDArray[np.float64]] | None,
     picture: Path,
 ) -> None:
-    """Write the picture."""
+    """Write the picture of where relays stand."""
     from launcher.picture import draw_plan
 
-    count = counted(len(facts["relays"]), "relay")
-    ways = [robot["way"] for robot in facts.get("robots", ())]
-    if ways:
-        count = f"{facts['search']}: {count}, {len(ways) - len(facts['relays'])} idle, cost {facts['cost']:.2f}"
     draw_plan(
         environment, polygons, request.base, request.agents, facts["relays"], facts["links"], picture,
-        f"{environment.name or request.file.stem}: {count}", ways=ways,
+        f"{environment.name or request.file.stem}: {counted(len(facts['relays']), 'relay')}",
     )  # fmt: skip
+
+
+def title_moves(facts: dict[str, Any]) -> str:
+    """Of a picture of who goes where."""
+    relays = len(facts["relays"])
+    idle = len(facts["robots"]) - relays
+    return f"{facts['search']}: {counted(relays, 'relay')}, {idle} idle, cost {facts['cost']:.2f}"
 
 
 def _count(facts: dict[str, Any]) -> str:
@@ -127,15 +128,22 @@ def _tell_places(places: Sequence[tuple[str, Point]]) -> None:
         tell(f"  {title:9} {x:8.3f}, {y:8.3f}")
 
 
-def _tell_end(request: Request, facts: dict[str, Any], picture: Path | None) -> None:
+def tell_end(request: Request, facts: dict[str, Any]) -> None:
+    """What is to be known about the answer, and where pictures are."""
     for crowd in facts["crowds"]:
+        advice = (
+            "the motion lets them stand beside each other"
+            if request.moves.robots
+            else "let them stand beside each other"
+        )
         more = f" and {len(crowd) - LISTED} more" if len(crowd) > LISTED else ""
         tell(
             f"Too near: {', '.join(crowd[:LISTED])}{more} share a place, or stand less than "
-            f"{2 * request.placements.radius_m:g} m apart; let them stand beside each other."
+            f"{2 * request.placements.radius_m:g} m apart; {advice}."
         )
     most = counted(facts["most_relays_needed"], "relay")
     elsewhere = "" if facts["placements"] == "cells" else ", elsewhere in their sight at most one more"
     tell(f"An agent at any of the {facts['placements']} needs at most {most} from this base station{elsewhere}.")
-    if picture is not None:
-        tell(f"Picture: {picture}")
+    for title, file in (("Picture", request.picture), ("Diagram", request.diagram and request.diagram[1])):
+        if file is not None:
+            tell(f"{title}: {file}")

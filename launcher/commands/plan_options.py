@@ -23,13 +23,20 @@ Tolerance = Annotated[
     typer.Option("--tolerance", help="Of an occupancy grid's outline, in metres, up to 100; two cells if not given."),
 ]
 Picture = Annotated[Path | None, typer.Option(help="Write a picture (.png, .svg or .pdf).")]
+Diagram = Annotated[
+    tuple[str, Path] | None,
+    typer.Option(
+        metavar="A-B FILE",
+        help="Write the coordination diagram of two members as a picture, such as 1-3 of robots 1 and 3.",
+    ),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Write JSON for programs.")]
 
 LARGEST_M = 100.0
 """Radius of a robot at most, as in scenario files."""
 
 
-def check_picture(picture: Path | None) -> None:
+def check_picture(picture: Path | None, option: str = "--picture") -> None:
     """Raise where a picture cannot be written, before anything is computed for it.
 
     Raises:
@@ -38,9 +45,9 @@ def check_picture(picture: Path | None) -> None:
     if picture is None:
         return
     if picture.suffix.lower() not in {".png", ".svg", ".pdf"}:
-        raise ScenarioFault(f"--picture {picture}: cannot draw '{picture.suffix}'; use .png, .svg or .pdf")
+        raise ScenarioFault(f"{option} {picture}: cannot draw '{picture.suffix}'; use .png, .svg or .pdf")
     if not picture.parent.is_dir():
-        raise ScenarioFault(f"--picture {picture}: there is no folder {picture.parent}; make it, or choose another")
+        raise ScenarioFault(f"{option} {picture}: there is no folder {picture.parent}; make it, or choose another")
 
 
 def sayer(as_json: bool) -> Callable[[str], None]:

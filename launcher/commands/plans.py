@@ -2,35 +2,31 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from launcher.commands.plan_answer import draw, find_crowds, tell_moves, tell_tree
+from launcher.commands.plan_facts import answer_plan
 from launcher.commands.plan_options import (
     LARGEST_M,
     AsJson,
     Decomposition,
+    Diagram,
     MaxBitangent,
     Picture,
     Radius,
     Tolerance,
     check_picture,
-    sayer,
 )
-from launcher.console import LONGEST_S, busy, check_option, plainly, print_json, read_point
-from launcher.placements import PlacementOptions, Weighting, place
-from launcher.plan_request import Method, Movement, Moves, Request, Search, check_robots, present_tree, send_robots
-from launcher.present_tree import name_links, read_links
+from launcher.console import LONGEST_S, check_option, plainly, read_point
+from launcher.placements import PlacementOptions, Weighting
+from launcher.plan_request import Method, Movement, Moves, Request, Search
+from launcher.present_tree import read_links, read_pair
 from launcher.scenario import MOST_ROBOTS, ScenarioFault, find_map
 
 if TYPE_CHECKING:
-    from launcher.offline_plan import Terminals
-    from planning.decomposition import Cells
     from planning.edge_weights import RobotPenalty
-    from planning.placement_graph import PlacementGraph
 
 GREATEST = 1e9
 """Of any coefficient."""
@@ -78,6 +74,15 @@ def plan(
         list[str] | None,
         typer.Option(metavar="X,Y", help="Where a robot is; may be repeated.", rich_help_panel=_MOVES),
     ] = None,
+    agent_from: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="X,Y",
+            help="Where an agent comes from, by the schedule as robots do; once for each agent. It is there already if "
+            "not given.",
+            rich_help_panel=_MOVES,
+        ),
+    ] = None,
     search: Annotated[
         Search,
         typer.Option(
@@ -112,9 +117,14 @@ def plan(
     idle: Annotated[bool, typer.Option("--idle", help="Robots may be left out.", rich_help_panel=_MOVES)] = False,
     tolerance_m: Tolerance = None,
     picture: Picture = None,
+    diagram: Diagram = None,
     as_json: AsJson = False,
 ) -> None:
-    """Say where robots are to stand so that lines of sight join the base station to all agents, and who goes where."""
+    """Say where robots are to stand so that lines of sight join the base station to all agents, and who goes where.
+
+    Of robots that are somewhere already it also says in which order they go there, so that nobody collides and the
+    network holds on the way.
+    """
     with plainly():
         check_option("--robots", robots, 0, MOST_ROBOTS)
         check_option("--vertices", vertices, 1, 2 * MOST_ROBOTS)
@@ -129,6 +139,7 @@ def plan(
         check_option("--speed", speed_m_s, 1e-3, LARGEST_M, "m/s")
         check_option("--deadline", deadline_s, 0, LONGEST_S, "seconds")
         starts = tuple(read_point(text, "--robot") for text in robot or ())
+        came = tuple(read_point(text, "--agent-from") for text in agent_from or ())
         check_option("the number of --robot", len(starts), 0, MOST_ROBOTS)
         weighting = Weighting(weights, distance_weight, area_weight, area_cost, _read_penalty(robot_penalty))
         present = read_links(link, len(agent), len(starts), idle) if link else ()
@@ -140,12 +151,16 @@ def plan(
             robots,
             method,
             vertices,
-            Moves(starts, search, mu, movement, jump_penalty_m, speed_m_s, deadline_s, idle, present),
+            Moves(starts, search, mu, movement, jump_penalty_m, speed_m_s, deadline_s, idle, present, came),
             tolerance_m,
+            picture,
+            None if diagram is None else (read_pair(diagram[0], len(agent), len(starts)), diagram[1]),
         )
         request.check()
         check_picture(picture)
-        _answer(request, picture, as_json)
+        if diagram is not None:
+            check_picture(diagram[1], "--diagram")
+        answer_plan(request, as_json)
 
 
 def _read_penalty(text: str | None) -> RobotPenalty | None:
@@ -166,90 +181,3 @@ def _read_penalty(text: str | None) -> RobotPenalty | None:
         raise ScenarioFault(f"--robot-penalty '{text}' is no penalty; give a number, 'pairwise' or 'fewest'") from None
     check_option("--robot-penalty", value, 0, GREATEST)
     return value
-
-
-def _answer(request: Request, picture: Path | None, as_json: bool) -> None:
-    from launcher.ground import Ground
-    from launcher.kernels import warm_up
-
-    say = sayer(as_json)
-    warm_up(say, ["planning"])
-    file, options = request.file, request.placements
-    ground = Ground.around(file, file, "--base", request.base, request.tolerance_m)
-    for agent in request.agents:
-        ground.check_inside("--agent", agent)
-    for robot in request.moves.robots:
-        ground.check_walk("--radius", {"--robot": robot}, options.radius_m, request.base, "--base")
-    ground.room("--radius", options.radius_m, request.base, "--base")
-    with busy("Planning ..."):
-        graph, cells = place(file, ground.environment, options, request.base, say)
-        from launcher.offline_plan import NoPlan, Terminals
-
-        terminals = Terminals(graph, [request.base, *request.agents])
-        if lost := terminals.unreachable():
-            x, y = request.agents[lost[0]]
-            raise ScenarioFault(
-                f"{file}: no chain of robots joins --agent {x:g},{y:g} to --base; move it, make --radius smaller, or "
-                "choose other placements"
-            )
-        try:
-            facts = _find(request, terminals, graph, cells)
-        except NoPlan as problem:
-            raise ScenarioFault(f"{file}: {problem}") from problem
-    if picture is not None:
-        draw(request, facts, ground.environment, None if cells is None else cells.polygons, picture)
-    if as_json:
-        print_json(facts)
-    else:
-        (tell_moves if request.moves.robots else tell_tree)(request, facts, picture)
-
-
-def _find(request: Request, terminals: Terminals, graph: PlacementGraph, cells: Cells | None) -> dict[str, Any]:
-    """The plan, as it is written for programs."""
-    from launcher.offline_plan import NoPlan
-
-    moves, options = request.moves, request.placements
-    try:
-        need = terminals.need(request.method)
-    except NoPlan:
-        # Where a tree is not made by this method, another refuses or does without: the count is no reason to.
-        if request.vertices is None and (not moves.robots or moves.search == "tree"):
-            raise
-        need = terminals.need("takahashi-matsuyama")
-    check_robots(request, need)
-    facts: dict[str, Any] = {
-        "map": str(request.file),
-        "base": request.base,
-        "agents": list(request.agents),
-        "placements": options.kind,
-        "decomposition": options.decomposition if options.kind == "cells" else None,
-        "robot_radius_m": options.radius_m,
-        "relays_needed": need.relays,
-        "relays_needed_is_least": need.least,
-        "most_relays_needed": max(0, int(graph.relays_from(request.base).max()) - 1),
-    }
-    if not moves.robots:
-        tree = terminals.tree(request.method, request.vertices, request.robots)
-        facts |= asdict(tree)
-        facts["spares"] = None if request.robots is None else request.robots - len(tree.relays)
-    else:
-        plan, ways = send_robots(request, terminals, graph, cells)
-        present = present_tree(request)
-        facts |= {
-            "robots": [
-                {"from": start, "to": end, "way": way}
-                for start, end, way in zip(moves.robots, plan.targets, ways, strict=True)
-            ],
-            "relays": [target for target in plan.targets if target is not None],
-            "links": plan.links,
-            "movement": plan.movement,
-            "virtual": plan.virtual,
-            "cost": plan.cost,
-            "mu": moves.mu,
-            "unit": "m" if moves.speed_m_s is None else "s",
-            "lower_bound": plan.lower_bound,
-            "search": moves.search,
-            "present_tree": None if present is None else name_links(present, len(request.agents), len(moves.robots)),
-        }
-    facts["crowds"] = find_crowds(request, facts)
-    return facts

@@ -40,6 +40,23 @@ def new_figure(width_in: float, height_in: float) -> Figure:
     return Figure(figsize=(width_in, height_in), dpi=DOTS_PER_IN, layout="constrained")
 
 
+def new_panels(number: int, title: str) -> tuple[Figure, list[Axes]]:
+    """A figure with so many axes, four in a row."""
+    columns = min(number, 4)
+    rows = -(-number // columns)
+    figure = new_figure(3.7 * columns, 3.2 * rows + 0.8)
+    figure.suptitle(title, fontsize=11, x=0.01, ha="left")
+    return figure, [figure.add_subplot(rows, columns, place + 1) for place in range(number)]
+
+
+def shade_of(value: int, series: Sequence[int]) -> str:
+    """A colour for one of several values in order."""
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    return to_hex(colormaps["viridis"](0.88 * series.index(value) / max(len(series) - 1, 1)))
+
+
 def write_figure(figure: Figure, file: Path) -> Path:
     """Write a figure as PNG of 256 colours, with less than half the bytes of one of all; the folder must exist."""
     from PIL import Image

@@ -12,13 +12,14 @@ whatever the place; beside a point, where they do.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from launcher.standing_room import overlapping, stand_apart
 from launcher.studies.redeployment_runs import RADIUS_M, TRIES, NothingToJoin
 from planning import PlacementGraph, redeploy
 from planning.tree import Ints
@@ -28,11 +29,8 @@ Floats = NDArray[np.float64]
 WALK = 10
 """Redeployments with one base."""
 
-APART_M = 2.0 * RADIUS_M + 0.02
-"""Between the places where two members stand, at least."""
-
-REACH = 3
-"""Places in a cell are sought so many steps of that width around its position."""
+ROOM_M = RADIUS_M + 0.01
+"""Half the distance between the places where two members stand, at least."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,40 +65,6 @@ class MotionTask:
     next_tree: Ints
 
 
-class Rooms:
-    """Where members can stand in the placements of a graph: at their positions, and beside them.
-
-    Args:
-        graph: the placements.
-    """
-
-    def __init__(self, graph: PlacementGraph) -> None:
-        self._graph = graph
-        self._free = graph.free.polygon
-        shapely.prepare(self._free)
-        around = APART_M * np.stack(np.meshgrid(*2 * [np.arange(-REACH, REACH + 1)]), axis=-1).reshape(-1, 2)
-        self._around = around[np.argsort(np.hypot(*around.T), kind="stable")]
-        self._places: dict[int, Floats] = {}
-
-    def find(self, placement: int, taken: Sequence[Floats]) -> Iterator[Floats]:
-        """Places (2,), metres, in a placement, away from all that are taken, the nearest to its position first."""
-        if placement not in self._places:
-            self._places[placement] = self._look_around(placement)
-        for place in self._places[placement]:
-            if all(np.hypot(*(place - other)) >= APART_M for other in taken):
-                yield place
-
-    def _look_around(self, placement: int) -> Floats:
-        """The placement's own position, then others beside it: (n, 2)."""
-        places: Floats = self._graph.positions[placement] + self._around
-        points = shapely.points(places)
-        inside = np.asarray(shapely.covers(self._free, points))
-        if self._graph.kind == "cells":
-            inside &= shapely.covers(shapely.Polygon(self._graph.outlines[self._graph.cells[placement]]), points)
-        inside[0] = True  # which may lie on the border
-        return places[inside]
-
-
 def draw_tasks(graph: PlacementGraph, question: Question, number: int, seed: int) -> Iterator[MotionTask]:
     """Random redeployments, always the same for the same arguments.
 
@@ -114,16 +78,15 @@ def draw_tasks(graph: PlacementGraph, question: Question, number: int, seed: int
         NothingToJoin: hardly any places could be joined, or had room for all.
     """
     rng = np.random.default_rng([seed, question.nodes, question.near])
-    rooms = Rooms(graph)
     standing: _Standing | None = None
     drawn = 0
     for _ in range(TRIES * number):
         if standing is None or drawn % WALK == 0:
-            standing = _deploy_anew(graph, rooms, question, rng)
+            standing = _deploy_anew(graph, question, rng)
             if standing is None:
                 continue
         choices = np.flatnonzero(graph.visible[standing.cells[1]]) if question.near else np.arange(len(graph))
-        after = _redeploy(graph, rooms, standing, int(rng.choice(choices)), question.mu_m)
+        after = _redeploy(graph, standing, int(rng.choice(choices)), question.mu_m)
         if after is None:
             continue
         yield MotionTask(standing.places, after.places, standing.tree, after.tree)
@@ -145,15 +108,15 @@ class _Standing:
     tree: Ints
 
 
-def _deploy_anew(graph: PlacementGraph, rooms: Rooms, question: Question, rng: np.random.Generator) -> _Standing | None:
+def _deploy_anew(graph: PlacementGraph, question: Question, rng: np.random.Generator) -> _Standing | None:
     """Base, agent and robots from random places; None where these cannot be joined or do not fit."""
     team = rng.integers(0, len(graph), question.nodes)
     if not 0 <= graph.relays_from(graph.positions[team[0]])[team[1]] - 1 <= question.nodes - 2:
         return None
-    return _settle(graph, rooms, graph.distances[team], team[:2], None, question.mu_m)
+    return _settle(graph, graph.distances[team], team[:2], None, question.mu_m)
 
 
-def _redeploy(graph: PlacementGraph, rooms: Rooms, standing: _Standing, agent: int, mu_m: float) -> _Standing | None:
+def _redeploy(graph: PlacementGraph, standing: _Standing, agent: int, mu_m: float) -> _Standing | None:
     """The same team after its agent has gone elsewhere; None where it cannot be joined or does not fit."""
     base = standing.cells[0]
     if (
@@ -162,36 +125,39 @@ def _redeploy(graph: PlacementGraph, rooms: Rooms, standing: _Standing, agent: i
     ):
         return None
     move = np.array([graph.distances_from(place) for place in standing.places])
-    return _settle(graph, rooms, move, np.array([base, agent]), standing, mu_m)
+    return _settle(graph, move, np.array([base, agent]), standing, mu_m)
 
 
 def _settle(
-    graph: PlacementGraph, rooms: Rooms, move: Floats, ends: Ints, standing: _Standing | None, mu_m: float
+    graph: PlacementGraph, move: Floats, ends: Ints, standing: _Standing | None, mu_m: float
 ) -> _Standing | None:
     """The least costly deployment with base and agent in these placements, and places for all."""
     move[:2] = np.where(np.arange(len(graph)) == ends[:, None], 0.0, np.inf)
     found = redeploy(move, graph.weights, mu_m)
-    if found.tree is None:
+    tree = found.tree
+    if tree is None:
         return None
-    places: list[Floats | None] = [None] * len(move)
+    places = graph.positions[found.cells]
+    stay = np.zeros(len(places), dtype=np.bool_)
     if standing is not None:
-        places = [
-            place if before == cell else None
-            for before, place, cell in zip(standing.cells, standing.places, found.cells, strict=True)
-        ]
-    for node, cell in enumerate(found.cells.tolist()):
-        if places[node] is None:
-            partners = found.tree[(found.tree == node).any(axis=1)].sum(axis=1) - node
-            seen = [place for place in (places[partner] for partner in partners) if place is not None]
-            free = rooms.find(cell, [place for place in places if place is not None])
-            places[node] = next((place for place in free if _sees_all(graph, place, seen)), None)
-            if places[node] is None:
-                return None
-    chosen = np.array(places)
-    if not all(_sees_all(graph, chosen[u], [chosen[v]]) for u, v in found.tree):
-        return None  # two that stay beside their points
-    return _Standing(found.cells, chosen, found.tree)
+        stay = standing.cells == found.cells
+        places = np.where(stay[:, None], standing.places, places)
+
+    def fits(node: int, place: Floats, chosen: Floats) -> bool:
+        """In its cell it sees all that it has to; beside a point that is to be seen."""
+        if not graph.free.contains(place[None])[0]:
+            return False
+        if graph.kind == "cells":
+            cell = shapely.Polygon(graph.outlines[graph.cells[found.cells[node]]])
+            return bool(shapely.covers(cell, shapely.Point(place)))
+        return _sees_all(graph, place, chosen[tree[(tree == node).any(axis=1)].sum(axis=1) - node])
+
+    places = stand_apart(places, np.flatnonzero(stay).tolist(), np.full(len(places), ROOM_M), fits)
+    joined = all(_sees_all(graph, places[u], places[v : v + 1]) for u, v in tree)
+    if not joined or any(overlapping(places, np.full(len(places), RADIUS_M))):
+        return None
+    return _Standing(found.cells, places, tree)
 
 
-def _sees_all(graph: PlacementGraph, place: Floats, others: Sequence[Floats]) -> bool:
-    return all(graph.environment.line_of_sight(tuple(place), tuple(other)) for other in others)
+def _sees_all(graph: PlacementGraph, place: Floats, others: Floats) -> bool:
+    return bool(np.all(graph.environment.line_of_sight(place[None], others)))

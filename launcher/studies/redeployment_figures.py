@@ -16,7 +16,6 @@ from planning import PlacementGraph, Redeployment, redeploy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 Floats = NDArray[np.float64]
 
@@ -31,10 +30,12 @@ def dearer(answers: Sequence[Answer], search: str) -> Floats:
 
 def draw_costs(found: Mapping[str, Mapping[int, Sequence[Answer]]], file: Path) -> None:
     """How many redeployments cost how much more than the optimum; found by map and k."""
-    figure, panels = _panels(len(found), f"What {' and '.join(SEARCHES[1::2])} search cost beside the optimum")
+    figure, panels = drawing.new_panels(
+        len(found), f"What {' and '.join(SEARCHES[1::2])} search cost beside the optimum"
+    )
     for axes, (name, by_nodes) in zip(panels, found.items(), strict=True):
         for nodes, answers in by_nodes.items():
-            shade = _shade(nodes, list(by_nodes))
+            shade = drawing.shade_of(nodes, list(by_nodes))
             for search, style in (("one-edge", "-"), ("fixed", ":")):
                 more = 100.0 * np.sort(dearer(answers, search))
                 shares = 100.0 * (1.0 - np.arange(len(more)) / len(more))
@@ -50,7 +51,7 @@ def draw_costs(found: Mapping[str, Mapping[int, Sequence[Answer]]], file: Path) 
 
 def draw_times(found: Mapping[str, Mapping[int, Sequence[Answer]]], file: Path) -> None:
     """Median processor times; found by map and k."""
-    figure, panels = _panels(len(found), "Processor time of a redeployment, median")
+    figure, panels = drawing.new_panels(len(found), "Processor time of a redeployment, median")
     for axes, (name, by_nodes) in zip(panels, found.items(), strict=True):
         for search in SEARCHES:
             times = [1e3 * np.median([one.seconds[search] for one in answers]) for answers in by_nodes.values()]
@@ -116,18 +117,3 @@ def _draw_redeployment(axes: Axes, ground: PlacementGraph, task: Task, found: Re
         axes.plot(*place, "s" if name == "B" else "o", color=colour, markersize=9, zorder=8)
         axes.annotate(name, place, ha="center", va="center", color="white", fontsize=7, fontweight="bold", zorder=9)
     return driven
-
-
-def _panels(number: int, title: str) -> tuple[Figure, list[Axes]]:
-    columns = min(number, 4)
-    rows = -(-number // columns)
-    figure = drawing.new_figure(3.7 * columns, 3.2 * rows + 0.8)
-    figure.suptitle(title, fontsize=11, x=0.01, ha="left")
-    return figure, [figure.add_subplot(rows, columns, place + 1) for place in range(number)]
-
-
-def _shade(nodes: int, series: Sequence[int]) -> str:
-    from matplotlib import colormaps
-    from matplotlib.colors import to_hex
-
-    return to_hex(colormaps["viridis"](0.88 * series.index(nodes) / max(len(series) - 1, 1)))

@@ -27,6 +27,7 @@ def cases() -> Iterator[Case]:
     from tests.benchmarks import (
         chain_cases,
         estimation_benchmarks,
+        motion_benchmarks,
         planning_benchmarks,
         process_benchmarks,
         redeployment_cases,
@@ -37,6 +38,7 @@ def cases() -> Iterator[Case]:
     yield from steiner_cases.cases()
     yield from redeployment_cases.cases()
     yield from chain_cases.cases()
+    yield from motion_benchmarks.cases()
     yield from estimation_benchmarks.cases()
     yield from process_benchmarks.cases()
 

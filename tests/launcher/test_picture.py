@@ -89,25 +89,6 @@ def test_matplotlib_is_not_imported_before_a_picture_is_drawn() -> None:
     assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0
 
 
-def test_ways_are_drawn_round_walls(tmp_path: Path) -> None:
-    """No pixel of a way is on a wall that lies straight between its ends."""
-    from launcher import picture
-
-    way = [(1.0, 4.0), (4.0, 6.5), (6.0, 6.5), (9.0, 4.0)]
-    draw_plan(ROOM, None, (1.0, 1.0), [(11.0, 1.0)], [way[-1]], [], tmp_path / "plan.png", "round", ways=[way])
-    with Image.open(tmp_path / "plan.png") as image:
-        pixels = np.asarray(image.convert("RGB"))
-    wall = np.argwhere((pixels == hexadecimal(picture.WALL)).all(axis=2))
-    left, (bottom, right) = wall[:, 1].min(), wall.max(axis=0)
-    dots_per_m = (right - left) / 12
-    drawn = np.argwhere((pixels == hexadecimal(picture._MOVE)).all(axis=2))
-    x, y = (drawn[:, 1] - left) / dots_per_m, (bottom - drawn[:, 0]) / dots_per_m
-    floor = (x > 0) & (x < 12) & (y > 0) & (y < 8)
-    assert floor.sum() > 100
-    assert y[floor].max() > 6.3
-    assert not ((x > 4.1) & (x < 5.9) & (y > 2.1) & (y < 5.9)).any()
-
-
 def test_no_marker_covers_another() -> None:
     from matplotlib.figure import Figure
 
