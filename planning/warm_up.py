@@ -67,7 +67,7 @@ def exercise() -> None:
     certify(Schedule(two.members, two.paths, 0.2, stages=[(0, 1), (0, 0)]), rooms, links=[("a", "b")], ends=("a", "b"))
     past_each_other = [(7.0, 4.0), (11.0, 4.0)], [(11.0, 4.0), (7.0, 4.0)]
     plan_motion(rooms, *past_each_other, 0.2, members=["a", "b"], unscheduled={"c": [(9.0, 4.0), (9.0, 4.5)]})
-    time_in_sight(rooms, points[:2], points[2], 1.0, 0.5)
+    time_in_sight(rooms, [(1.0, 1.0), (2.0, 1.0)], (6.0, 1.0), 1.0, 0.5)
     graph = PlacementGraph.from_points(rooms, 0.2, 2.0)
     graph.distances_from(points[0])
     _ = graph.distances
