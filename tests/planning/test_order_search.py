@@ -16,7 +16,6 @@ from planning.pair_tables import SEES
 from planning.staging import choose_cuts
 from tests.planning.order_oracle import Oracle, random_demand, random_tables
 
-
 SEARCHED = {3: (8, 116, 204, 414, 680, 874, 1080, 1206), 4: (825, 1135, 1233, 1355, 1467, 1927)}
 """Seeds, by the number of members, for which going on together ends nowhere, and another order is found."""
 

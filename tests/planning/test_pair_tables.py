@@ -56,7 +56,7 @@ def test_paths_are_cut_at_their_corners_into_pieces_that_are_short_enough(
 
 
 @given(seed=st.integers(0, 10_000))
-@settings(max_examples=30)
+@settings(max_examples=20)
 def test_elements_are_apart_as_their_distance_says(seed: int) -> None:
     rng = np.random.default_rng(seed)
     # On whole coordinates paths overlap, touch, and are exactly S apart.
@@ -72,7 +72,7 @@ def test_elements_are_apart_as_their_distance_says(seed: int) -> None:
 
 
 @given(seed=st.integers(0, 10_000))
-@settings(max_examples=30)
+@settings(max_examples=20)
 def test_elements_see_each_other_as_their_hulls_say(seed: int) -> None:
     environment = environment_of(seed)
     rng = np.random.default_rng(seed)
@@ -87,7 +87,7 @@ def test_elements_see_each_other_as_their_hulls_say(seed: int) -> None:
 
 
 @given(seed=st.integers(0, 10_000))
-@settings(max_examples=30)
+@settings(max_examples=20)
 def test_no_sight_line_between_elements_that_see_each_other_is_blocked(seed: int) -> None:
     """On the grid of the walls, where sight lines run along walls and through corners."""
     environment = rectilinear_environment(2 * seed)
