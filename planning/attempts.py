@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 
 from planning.bridge import cross_bridge
 from planning.continuation import follow
-from planning.detour import blocked_by_standing, other_paths, paths_around, shortest_paths, space_around_standing
+from planning.detour import (
+    blocked_by_standing,
+    other_paths,
+    path_over_outermost,
+    paths_around,
+    shortest_paths,
+    space_around_standing,
+)
 from planning.motion_plan import Schedule
 from planning.move_search import Moves
 from planning.no_schedule import NoSchedule
@@ -32,6 +39,10 @@ EFFORT: Final = 2000
 
 OTHER_SCHEDULES: Final = 2
 """So many schedules are tried on paths of other classes."""
+
+
+WORTHWHILE: Final = 0.2
+"""Share of all detours: who makes so much of them is asked to make one alone."""
 
 
 class Attempts:
@@ -72,6 +83,7 @@ class Attempts:
             moves = self._search(steps, level)
             staged = self._stage(steps, moves.places, level) if moves.complete else None
             if staged is not None:
+                yield from self._ease(staged, level)
                 yield staged, "stepwise"
         for steps in self._crews():
             places = cross_bridge(steps, level, self._effort)
@@ -125,6 +137,20 @@ class Attempts:
         if rows:
             for others in islice(other_paths(task, paths, rows, space_around_standing(task)), OTHER_SCHEDULES):
                 yield others, "detour"
+
+    def _ease(self, staged: Schedule, level: Level) -> Iterator[tuple[Schedule, ArrivingWay]]:
+        """A schedule in which one waits aside where it does in this one, and all others go their shortest ways."""
+        task = self._task
+        extra = [path.length_m - length for path, length in zip(staged.paths, task.geodesic_lengths_m, strict=False)]
+        for row in sorted(task.movers, key=lambda row: -extra[row])[:OTHER_SCHEDULES]:
+            if extra[row] < WORTHWHILE * sum(extra):
+                return
+            paths = shortest_paths(task)
+            paths[row] = path_over_outermost(task, row, staged.paths[row].waypoints)
+            try:
+                yield task.schedule(paths, level), "detour"
+            except NoSchedule:
+                continue
 
     def _blame(self, reason: str, between: tuple[str, str] | None) -> None:
         if not self.reason:

@@ -2,7 +2,8 @@
 
 Who starts at its goal stands there for good, and a geodesic through its disc is no way at all. Where that is so, the
 discs of all who stand are cut out of the free space, and the shortest ways lead around them. Where two are still in
-each other's way, or would have to part, one of them takes the next shortest way of another homotopy class.
+each other's way, or would have to part, one of them takes the next shortest way of another homotopy class; or it goes
+over a place where it waits for others to pass.
 """
 
 from __future__ import annotations
@@ -71,6 +72,14 @@ def other_paths(
     ]
     for _, i, way in sorted(others, key=lambda other: other[:2]):
         yield [way if row == i else path for row, path in enumerate(paths)]
+
+
+def path_over_outermost(task: TeamTask, row: int, waypoints: Floats) -> Floats:
+    """The shortest path of one member over the one of some waypoints (n, 2), metres, that is the farthest out."""
+    start, goal, geodesics = task.starts[row], task.goals[row], task.geodesics
+    places = waypoints[task.free.contains(waypoints)]
+    outermost = places[np.argmax(geodesics.lengths(start, places) + geodesics.lengths(goal, places))]
+    return np.concatenate([geodesics.path(start, outermost), geodesics.path(outermost, goal)[1:]])
 
 
 def _holds(space: GeodesicMap, task: TeamTask, row: int) -> bool:

@@ -3,8 +3,8 @@
 Ways, in the order in which they are tried, each within bounded effort:
 
 - *direct*: everybody on its geodesic, by a schedule;
-- *detour*: some lead around those who stand in the way, or along paths of other homotopy classes; by a schedule too
-  (`planning.detour`);
+- *detour*: some lead around those who stand in the way, along paths of other homotopy classes, or over a place aside
+  where one waits for others to pass; by a schedule too (`planning.detour`);
 - *stepwise*: one robot at a time over a roadmap, made into stages in which as many go at once as can
   (`planning.stepwise`);
 - *bridge*: the same over intermediate deployments (`planning.bridge`);

@@ -101,7 +101,8 @@ def _join_placements(
     """What all tasks on one map have in common."""
     free = geodesics.environment
     if placements is None:
-        places, _ = choose_points(environment, free, choose_spacing(environment, free))
+        # Places nearer to each other than two discs are of little use, and many.
+        places, _ = choose_points(environment, free, max(choose_spacing(environment, free), 2.0 * radius_m))
     else:
         places = placements.positions[free.contains(placements.positions)]
     return make_roadmap(environment, free, np.concatenate([places, find_mitres(environment, free, radius_m)]))
