@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.order_search import Demand, Order
+from planning.order_search import Order
 from planning.pair_prospects import OPEN, find_isolation, find_seen, mark_prospects
 from planning.pair_tables import APART, SEES, PairTables
 from planning.path_elements import PathElements
+from planning.step_rules import Demand
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -1,9 +1,4 @@
-"""Who advances when: a search in the product of the members' elements.
-
-A state is the node that each member is at. In a *step* some members go on by one piece, the *movers*; the others stay
-at their nodes. A step is allowed if all combinations of places on the way are in order: robots apart, and the team
-connected by links that hold throughout. What several may do together each of them may do alone, in any order; so
-steps of one mover are enough to find whatever can be found.
+"""Who advances when: a search in the product of the members' elements (`planning.step_rules`).
 
 First all go on together, in every step as many as can, those first that have longest to go: that is mostly all, and
 short. Where it ends nowhere, a search goes depth first, each state once, and needs few of the many orders:
@@ -27,25 +22,17 @@ from numpy.typing import NDArray
 from planning.kernel import kernel
 from planning.pair_conflicts import find_cluster, find_last_ahead, find_last_conflicts, move_freely
 from planning.pair_prospects import OPEN, mark_prospects
-from planning.pair_tables import APART, SEES, PairTables
+from planning.pair_tables import PairTables
+from planning.step_rules import Demand, add_mover, is_joined, stand
+
+__all__ = ["Demand", "Order", "is_joined", "search_order"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bytes = NDArray[np.uint8]
 
-
 STATES_IN_VAIN: Final = 1000
 """Of a search for the best effort, where it is proven that not all get to their goals."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Demand:
-    """What has to be connected: sets of members are bits of numbers."""
-
-    joined: int
-    """Members that have to be in one component."""
-    links: Ints
-    """(k,) int: the members that each member has to see."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,84 +85,6 @@ def search_order(tables: PairTables, demand: Demand, durations: Floats, last: In
 
 
 @kernel
-def is_joined(adjacent: Ints, joined: int) -> bool:
-    """Whether a set of members is in one component; ``adjacent`` (k,): whom each sees, as bits."""
-    reached = joined & -joined
-    fresh = reached
-    while joined & ~reached:
-        found = 0
-        for i in range(adjacent.shape[0]):
-            if fresh >> i & 1:
-                found |= adjacent[i]
-        fresh = found & ~reached
-        if fresh == 0:
-            return False
-        reached |= fresh
-    return True
-
-
-@kernel
-def _is_connected(adjacent: Ints, joined: int, links: Ints) -> bool:
-    for i in range(links.shape[0]):
-        if links[i] & ~adjacent[i]:
-            return False
-    return is_joined(adjacent, joined)
-
-
-@kernel
-def _look(bits: Bytes, starts: Ints, sizes: Ints, elements: Ints, state: Ints, i: int) -> int:
-    """Whom member i sees with all members on these elements, as bits.
-
-    −1 if it is too near to one, or the state that they come to is a dead end for it and another.
-    """
-    seen = 0
-    for j in range(elements.shape[0]):
-        if j != i:
-            pair = bits[starts[i, j] + elements[i] * sizes[j] + elements[j]]
-            if pair & APART == 0 or bits[starts[i, j] + 2 * (state[i] * sizes[j] + state[j])] & OPEN == 0:
-                return -1
-            if pair & SEES:
-                seen |= 1 << j
-    return seen
-
-
-@kernel
-def _stand(
-    bits: Bytes, starts: Ints, sizes: Ints, state: Ints, joined: int, links: Ints, elements: Ints, adjacent: Ints
-) -> bool:
-    """Whether all is in order with all members at their nodes; writes their elements and whom they see."""
-    for i in range(state.shape[0]):
-        elements[i] = 2 * state[i]
-    apart = True
-    for i in range(state.shape[0]):
-        adjacent[i] = _look(bits, starts, sizes, elements, state, i)
-        apart = apart and adjacent[i] >= 0
-    return apart and _is_connected(adjacent, joined, links)
-
-
-@kernel
-def _add_mover(
-    bits: Bytes, starts: Ints, sizes: Ints, i: int, joined: int, links: Ints, elements: Ints, state: Ints,
-    adjacent: Ints, trial: Ints,
-) -> bool:  # fmt: skip
-    """Let member i go on by one piece if it may, together with those that go already: ``state`` is where they come."""
-    elements[i] += 1
-    state[i] += 1
-    seen = _look(bits, starts, sizes, elements, state, i)
-    if seen >= 0:
-        trial[:] = adjacent
-        trial[i] = seen
-        for j in range(trial.shape[0]):
-            trial[j] = trial[j] & ~(1 << i) | (seen >> j & 1) << i
-        if seen == adjacent[i] or _is_connected(trial, joined, links):
-            adjacent[:] = trial
-            return True
-    elements[i] -= 1
-    state[i] -= 1
-    return False
-
-
-@kernel
 def _rank(state: Ints, last: Ints, remaining: Floats, ranked: Ints) -> int:
     """Write the members that are not at their goals, longest to go first; how many."""
     count = 0
@@ -202,13 +111,13 @@ def _go_together(
         np.zeros(k, np.int64),
     )  # fmt: skip
     n = 0
-    moved = _stand(bits, starts, sizes, state, joined, links, elements, adjacent)
+    moved = stand(bits, starts, sizes, state, joined, links, elements, adjacent)
     while moved:
         moved = False
         count = _rank(states[n], last, remaining, ranked)
-        _stand(bits, starts, sizes, state, joined, links, elements, adjacent)
+        stand(bits, starts, sizes, state, joined, links, elements, adjacent)
         for r in range(count):
-            if _add_mover(bits, starts, sizes, ranked[r], joined, links, elements, state, adjacent, trial):
+            if add_mover(bits, starts, sizes, ranked[r], joined, links, elements, state, adjacent, trial):
                 moved = True
         if moved:
             n += 1
@@ -250,7 +159,7 @@ def _search(
     grouped = joined == 0 and not links.any()
     slots[_find_slot(state, known, slots)] = 0
     found, top, best, least = 1, 0, 0, np.inf
-    if not _stand(bits, starts, sizes, state, joined, links, elements, adjacent):
+    if not stand(bits, starts, sizes, state, joined, links, elements, adjacent):
         top = -1
     while top >= 0 and found <= most_states:
         here = known[top]
@@ -275,8 +184,8 @@ def _search(
             if grouped and not find_cluster(ahead, here, ranked[0]) >> i & 1:
                 continue
             state[:] = here
-            _stand(bits, starts, sizes, state, joined, links, elements, adjacent)
-            if not _add_mover(bits, starts, sizes, i, joined, links, elements, state, adjacent, trial):
+            stand(bits, starts, sizes, state, joined, links, elements, adjacent)
+            if not add_mover(bits, starts, sizes, i, joined, links, elements, state, adjacent, trial):
                 continue
         slot = _find_slot(state, known, slots)
         if slots[slot] < 0:
@@ -313,11 +222,11 @@ def _hasten(states: Ints, bits: Bytes, starts: Ints, sizes: Ints, joined: int, l
             u = t
             while u > 0 and states[u, i] < states[u + 1, i] and states[u - 1, i] == states[u, i]:
                 state[:] = states[u - 1]
-                _stand(bits, starts, sizes, state, joined, links, elements, adjacent)
+                stand(bits, starts, sizes, state, joined, links, elements, adjacent)
                 for j in range(k):
                     if states[u - 1, j] < states[u, j]:
-                        _add_mover(bits, starts, sizes, j, joined, links, elements, state, adjacent, trial)
-                if not _add_mover(bits, starts, sizes, i, joined, links, elements, state, adjacent, trial):
+                        add_mover(bits, starts, sizes, j, joined, links, elements, state, adjacent, trial)
+                if not add_mover(bits, starts, sizes, i, joined, links, elements, state, adjacent, trial):
                     break
                 states[u, i] += 1
                 u -= 1

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from planning.environment import Environment
 from planning.motion_plan import InvalidSchedule
-from planning.order_search import Demand
+from planning.step_rules import Demand
 
 Floats = NDArray[np.float64]
 

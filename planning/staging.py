@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from planning.kernel import kernel
 from planning.motion_plan import TimedPath
-from planning.order_search import Demand, is_joined
 from planning.pair_tables import APART, SEES, PairTables
 from planning.path_elements import PathElements
+from planning.step_rules import Demand, is_joined
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

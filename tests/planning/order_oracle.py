@@ -8,8 +8,8 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.order_search import Demand
 from planning.pair_tables import APART, SEES, PairTables
+from planning.step_rules import Demand
 
 Ints = NDArray[np.int64]
 State = tuple[int, ...]

@@ -9,11 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planning.order_search import Demand, is_joined, search_order
+from planning.order_search import search_order
 from planning.pair_conflicts import find_last_conflicts
 from planning.pair_prospects import OPEN, mark_prospects
 from planning.pair_tables import SEES
 from planning.staging import choose_cuts
+from planning.step_rules import Demand, is_joined
 from tests.planning.order_oracle import Oracle, random_demand, random_tables
 
 SEARCHED = {3: (8, 116, 204, 414, 680, 874, 1080, 1206), 4: (825, 1135, 1233, 1355, 1467, 1927)}
