@@ -65,12 +65,10 @@ class Moves:
     Attributes:
         places: (n + 1, m) int: where the m movers are before each move, and after the last one.
         complete: whether all movers are at their goals after it.
-        exhausted: whether every deployment that can be reached on the roadmap was looked at.
     """
 
     places: Ints
     complete: bool
-    exhausted: bool
 
 
 def search_moves(roadmap: TeamRoadmap, crew: Crew, goals: Ints, effort: int, greed: float = GREED) -> Moves:
@@ -96,7 +94,7 @@ def search_moves(roadmap: TeamRoadmap, crew: Crew, goals: Ints, effort: int, gre
     path_watches = np.array([by_edge for _, by_edge in watched], dtype=np.bool_).reshape(-1, len(roadmap.edges))
     needed = sum(1 << i for i in crew.joined) if len(crew.joined) > 1 else 0
     environment = roadmap.environment
-    states, best, exhausted = _search(
+    states, best = _search(
         np.asarray(crew.at, dtype=np.int64), to_go, crew.radii_m, needed,
         link_paths(crew, environment.walls, environment.tolerance_m), path_sees, path_watches, roadmap.places,
         roadmap.visible, roadmap.edges, roadmap.starts, roadmap.at, roadmap.watched, environment.vertices,
@@ -107,7 +105,7 @@ def search_moves(roadmap: TeamRoadmap, crew: Crew, goals: Ints, effort: int, gre
         trail.append(states[best, :m])
         best = states[best, m]
     places = np.array(trail[::-1], dtype=np.int64)
-    return Moves(places, bool(np.array_equal(places[-1], goals)), bool(exhausted))
+    return Moves(places, bool(np.array_equal(places[-1], goals)))
 
 
 def link_paths(crew: Crew, walls: Floats, tolerance: float) -> Bools:
@@ -196,8 +194,8 @@ def _search(
     start: Ints, to_go: Floats, radii: Floats, needed: int, path_links: Bools, path_sees: Bools,
     path_watches: Bools, places: Floats, visible: Bools, edges: Ints, starts: Ints, edges_at: Ints, watched: Bytes,
     vertices: Floats, tolerance: float, greed: float, effort: int,
-) -> tuple[Ints, int, bool]:  # fmt: skip
-    """Deployments (n, m + 1), the row of the one before last; the row nearest to the goals; whether these are all."""
+) -> tuple[Ints, int]:  # fmt: skip
+    """Deployments (n, m + 1), last the row of the one before; the row nearest to the goals."""
     k, m = start.shape[0], to_go.shape[0]
     size = 1 << 12
     known = np.empty((size, m + 1), np.int64)
@@ -253,7 +251,7 @@ def _search(
                 heapq.heappush(queue, (further + greed * left, -count, further))
                 count += 1
             state[i] = u
-    return known[:count], best, len(queue) == 0
+    return known[:count], best
 
 
 @kernel
