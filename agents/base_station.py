@@ -18,7 +18,8 @@ from msgspec import structs
 from agents.dispatcher import Dispatcher
 from agents.mission import Mission
 from agents.network import judge_network
-from agents.records import Decision, LogLine, Ordered, Planned, Track
+from agents.planning_job import Answer, Question
+from agents.records import Advance, Decision, LogLine, Ordered, Planned, Track
 from agents.rhythm import EARLY_S, Rhythm
 from agents.role import (
     Compute,
@@ -31,7 +32,6 @@ from agents.role import (
     WakeAt,
     Woken,
 )
-from agents.team_planner import Answer, Question
 from planning.environment import Environment
 from protocol.bus import PeerAppeared, PeerVanished
 from protocol.messages import AnyBody, Authority, Deployment, Heartbeat, Intent, Mode, Placement, Point, State
@@ -104,6 +104,8 @@ class BaseStation:
         self._orders: Deployment | None = None
         """What was said last."""
         self._said_s = -math.inf
+        self._advance: Advance | None = None
+        """What was recorded last."""
         self._planning = self._urgent = False
         self._complaints: dict[str, str] = {}
         """What was wrong last, by what it was about; said once, however often it happens."""
@@ -217,8 +219,8 @@ class BaseStation:
         self._planning = False
         self._complain("error", "planning failed, the last deployment stands: ", done.failure)
         if not done.failure:
-            self._effects.append(Record(Planned(planning_s=done.duration_s)))
             answer: Answer = done.result
+            self._effects.append(Record(Planned(planning_s=done.duration_s, in_sight_s=answer.in_sight_s)))
             self._decide(answer.plan, done.duration_s)
             self._complain("error", "no motion to the deployment: ", answer.failure)
             if answer.course is not None and self._dispatcher.take(answer.course):
@@ -262,6 +264,9 @@ class BaseStation:
         )
         if dispatcher.said(self._authority, now_s) and self._orders.motion is not None:
             self._effects.append(Record(Ordered(motion=self._orders.motion)))
+        if (advance := dispatcher.advance) != self._advance and advance is not None:
+            self._effects.append(Record(advance))
+        self._advance = advance
         self._said_s = now_s
         self._say_at_s = now_s + (AGAIN_S if dispatcher.pressing else self._orders.valid_for_s / REPETITIONS)
         self._effects.append(Publish(self._orders))

@@ -79,7 +79,7 @@ class Casting:
 
         deployments = self.planner()
         motions = MotionPlanner(self._mission, self._environment, deployments.graph, self._judge)
-        return TeamPlanner(deployments, motions, self._mission.agent_speed_m_s)
+        return TeamPlanner(self._environment, deployments, motions, self._mission.agent_speed_m_s)
 
     def _build_planner(self) -> DeploymentPlanner:
         from agents.leader import DeploymentPlanner  # its imports take a quarter of a second, and one peer needs them

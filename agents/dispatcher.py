@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from agents.motion_message import end_stage
 from agents.movement_authority import MovementAuthority, Onset
+from agents.records import Advance
 from protocol.messages import Authority, Motion, Point, Progress, State
 
 if TYPE_CHECKING:
@@ -91,6 +92,11 @@ class Dispatcher:
         return Progress(epoch=known.epoch, plan=motion.plan, revision=motion.revision, finished=end_stage(motion))
 
     @property
+    def advance(self) -> Advance | None:
+        """How far the motion under way is; None if everybody holds."""
+        return None if self._authority is None else self._authority.advance()
+
+    @property
     def heading(self) -> Mapping[str, Point]:
         """Where the motion under way leads; empty if to no goals."""
         return self._heading
@@ -158,11 +164,11 @@ class Dispatcher:
         if motion.plan != self._plan or (known is not None and known.over and not _moves(motion)):
             return False
         if known is None:
-            self._authority = MovementAuthority(self._epoch, motion, list(course.goals))
+            self._authority = MovementAuthority(self._epoch, motion, list(course.option.goals))
             self._held = self._ended = None
         else:
             known.revise(motion)
-        self._heading = course.goals if course.arrives else {}
+        self._heading = course.option.goals if course.arrives else {}
         self._ordered, self.news, self._due = None, True, True
         return True
 

@@ -5,12 +5,16 @@ The agent is independent. It waits for nobody, so of it is planned only where it
 the way of somebody who goes where he likes. Robots that are not heard any more stand somewhere on the way that they
 were last allowed, and are in the way of all others.
 
-What is asked of lines of sight, from strict to lax, and the first that can be had is taken:
+What is asked of lines of sight, from strict to lax:
 
 1. the whole team and the agent's next moments are one network,
 2. base station and robots are,
 3. base station and the last relays, of this deployment and of the one before, are, over any others,
 4. nothing: the discs only keep apart.
+
+A stricter demand may take longer, and the agent does not wait. So every motion is followed in thought, like the
+proposals of :mod:`agents.leader`: the first is taken on which the chain to the agent holds about as long as if all
+could go at once, else that on which it holds longest.
 """
 
 from __future__ import annotations
@@ -27,6 +31,7 @@ from numpy.typing import NDArray
 from agents.mission import Mission
 from agents.motion_message import to_motion
 from agents.movement_authority import Onset
+from agents.outlook import Prospect
 from planning.foresight import walk
 from planning.motion import Motion as TeamMotion
 from planning.motion import plan_motion
@@ -46,6 +51,15 @@ FORESIGHT_S: Final = 1.0
 STAGE_S: Final = 0.25
 """Stages are cut to this duration, so that those released reach no farther than they must."""
 
+SLOWER_S: Final = 0.3
+"""A motion is good enough if the chain holds that much shorter on it than if all could go at once."""
+
+LAXITY_S: Final = 0.3
+"""A less strict demand must be worth so many seconds more of a chain that holds."""
+
+STRANDED_S: Final = 2.0
+"""Likewise a motion that does not arrive."""
+
 EFFORT: Final = 300
 LAST_EFFORT: Final = 2000
 """Of searches for a motion that keeps sight, and for one that need not."""
@@ -55,15 +69,25 @@ GROWTH: Final = 0.15
 
 
 @dataclass(frozen=True, eq=False)
+class Option:
+    """Where the robots may go."""
+
+    goals: Mapping[str, Point]
+    """Of each robot of the onset."""
+    ends: Sequence[str]
+    """The last relays of the deployments before and after, as far as there are any."""
+
+
+@dataclass(frozen=True, eq=False)
 class Course:
     """A motion from its onset on."""
 
     motion: Motion
     """With what goes on from before."""
-    goals: Mapping[str, Point]
-    """Where the robots are to go."""
+    option: Option
+    """Where it leads."""
     arrives: bool
-    """Whether all of them get there."""
+    """Whether everybody gets there."""
     reason: str = ""
     """Why not everybody arrives, or stays in sight of all others; a sentence."""
 
@@ -84,15 +108,12 @@ class MotionPlanner:
         self.geodesics = placements.geodesics
         self.base, self._agent = mission.base_station.name, mission.tracked_agent.name
 
-    def plan(
-        self, onset: Onset, goals: Mapping[str, Point], ends: Sequence[str], way: Floats, lost: Mapping[str, Floats]
-    ) -> Course:
-        """A motion to ``goals``.
+    def plan(self, onset: Onset, options: Sequence[Option], way: Floats, lost: Mapping[str, Floats]) -> Course:
+        """A motion to the goals of one of the options.
 
         Args:
             onset: where it begins.
-            goals: for each robot of the onset.
-            ends: the last relays of the deployments before and after.
+            options: the first is preferred.
             way: (m, 2) float, metres: the agent's, from where it will be at the onset.
             lost: (m, 2) each: where robots may be that are not heard any more.
 
@@ -104,41 +125,67 @@ class MotionPlanner:
 
         Complexity: that of a schedule, for each demand that cannot be met and the first that can.
         """
-        members = [self.base, *goals]
-        starts = [onset.places[name] for name in members]
-        ahead = _begin(way, FORESIGHT_S * self._mission.agent_speed_m_s)
         obstacles = {name: self._obstacle(way, onset) for name, way in lost.items()}
-        reason = ""
-        for joined in self._demands(members, ends):
-            found = plan_motion(
-                self._environment,
-                starts,
-                [onset.places[self.base], *goals.values()],
-                [0.0, *[self._mission.robot_radius_m] * len(goals)],
-                members=members,
-                speed_m_s=self._mission.robot_speed_m_s,
-                joined=joined,
-                unscheduled={self._agent: ahead} if self._agent in joined else None,
-                obstacles=[(where, self._mission.robot_radius_m) for where in obstacles.values()],
-                geodesics=self.geodesics,
-                placements=self._placements,
-                may_part=False,
-                effort=EFFORT if joined else LAST_EFFORT,
-            )
-            reason = reason or found.reason
-            if found.arrives:
+        prospect = Prospect(self._environment, way, self._mission.agent_speed_m_s)
+        hoped_s = max(prospect.worth(self._at_once(onset, option, prospect.times_s)) for option in options)
+        members = len(onset.places)  # those that go as they please come last
+        reason, best, best_s = "", None, -math.inf
+        for laxity, option, joined in self._demands(onset, options):
+            found = self._find(onset, option, joined, way, list(obstacles.values()))
+            worth_s = prospect.worth(found.schedule.positions(prospect.times_s)[:, :members])
+            worth_s -= LAXITY_S * laxity + STRANDED_S * (not found.arrives)
+            if best is None or worth_s > best_s:
+                best, best_s = (option, found), worth_s
+            if found.arrives and worth_s >= hoped_s - LAXITY_S * laxity - SLOWER_S:
                 break
-        return self._certify(onset, found, obstacles, goals, reason)
+            reason = reason or found.reason
+        assert best is not None
+        return self._certify(onset, *best, obstacles, reason)
 
-    def _demands(self, members: Sequence[str], ends: Sequence[str]) -> Iterator[frozenset[str]]:
-        """What is asked of lines of sight, from strict to lax (see the module)."""
-        demands = [frozenset((*members, self._agent)), frozenset(members)]
-        if ends:
-            demands.append(frozenset((self.base, *ends)))
-        yield from dict.fromkeys((*demands, frozenset[str]()))
+    def _find(
+        self, onset: Onset, option: Option, joined: frozenset[str], way: Floats, obstacles: Sequence[Floats]
+    ) -> TeamMotion:
+        """The motion to an option's goals in which these members stay in one network."""
+        mission, members = self._mission, [self.base, *option.goals]
+        ahead = _begin(way, FORESIGHT_S * mission.agent_speed_m_s)
+        return plan_motion(
+            self._environment,
+            [onset.places[name] for name in members],
+            [onset.places[self.base], *option.goals.values()],
+            [0.0, *[mission.robot_radius_m] * len(option.goals)],
+            members=members,
+            speed_m_s=mission.robot_speed_m_s,
+            joined=joined,
+            unscheduled={self._agent: ahead} if self._agent in joined else None,
+            obstacles=[(where, mission.robot_radius_m) for where in obstacles],
+            geodesics=self.geodesics,
+            placements=self._placements,
+            may_part=False,
+            effort=EFFORT if joined else LAST_EFFORT,
+        )
+
+    def _demands(self, onset: Onset, options: Sequence[Option]) -> Iterator[tuple[int, Option, frozenset[str]]]:
+        """What is asked of lines of sight, from strict to lax (see the module), and how lax that is."""
+        team = frozenset(onset.places)
+        for laxity in range(4):
+            for option in options:
+                chain = frozenset((self.base, *option.ends))
+                joined = (team | {self._agent}, team, chain, frozenset[str]())[laxity]
+                if laxity != 2 or 1 < len(chain) < len(team):
+                    yield laxity, option, joined
+
+    def _at_once(self, onset: Onset, option: Option, times_s: Floats) -> Floats:
+        """Where everybody would be after so many seconds (t,) if nobody had to wait: (t, k, 2) float, metres."""
+        ways = [
+            np.array([onset.places[name]])
+            if option.goals.get(name, place) == place
+            else self.geodesics.path(place, option.goals[name])
+            for name, place in onset.places.items()
+        ]
+        return np.stack([walk(way, times_s * self._mission.robot_speed_m_s) for way in ways], axis=1)
 
     def _certify(
-        self, onset: Onset, found: TeamMotion, lost: Mapping[str, Floats], goals: Mapping[str, Point], reason: str
+        self, onset: Onset, option: Option, found: TeamMotion, lost: Mapping[str, Floats], reason: str
     ) -> Course:
         """The course, with the strictest of its demands that what is kept of the last motion meets too."""
         new = to_motion(
@@ -152,7 +199,7 @@ class MotionPlanner:
             motion = _demand(motion, demand)
             fault = self._judge(motion)
             if not fault:
-                return Course(motion, goals, found.arrives, reason)
+                return Course(motion, option, found.arrives, reason)
         raise ValueError(f"the motion planned is not certified: {fault}")
 
     def _obstacle(self, way: Floats, onset: Onset) -> Floats:

@@ -22,6 +22,7 @@ from itertools import islice, pairwise, takewhile
 from msgspec import structs
 
 from agents.motion_message import end_stage, piece
+from agents.records import Advance
 from protocol.messages import MemberWay, Motion, Point, Progress
 
 SAME_PLACE_M = 1e-9
@@ -162,6 +163,10 @@ class MovementAuthority:
         first = min(self.finished, end_stage(self.motion) - 1)
         if first > self.motion.first_stage:
             self._take(_cut(self.motion, first, end_stage(self.motion) - 1))
+
+    def advance(self) -> Advance:
+        """How far everybody is."""
+        return Advance(released=self.released, finished=dict(self._finished))
 
     def way(self, robot: str) -> tuple[Point, ...]:
         """Where a robot may be of which no more is heard: its stage and all that are released."""

@@ -51,11 +51,23 @@ class Ordered(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag
     motion: Motion
 
 
+class Advance(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag="advance"):
+    """How far the motion is, as the leader knows it: numbers of stages of the present plan."""
+
+    released: int
+    """Those that may be begun."""
+    finished: dict[str, int]
+    """Those that each robot has finished."""
+
+
 class Planned(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag="planned"):
     """A planning job has ended, whatever came of it."""
 
     planning_s: float
     """Time that it took (modelled in simulation)."""
+    in_sight_s: float = 0.0
+    """For how long from when its motion begins all that the agent can reach, wherever it goes, is in sight of the place
+    where the last relay is then, or the base station where there is no relay; no more than a minute is looked ahead."""
 
 
 class Connectivity(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag="connectivity"):
@@ -79,4 +91,4 @@ class LogLine(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag
     text: str
 
 
-AnyRecord: TypeAlias = Track | Decision | Ordered | Planned | Connectivity | LogLine
+AnyRecord: TypeAlias = Track | Decision | Ordered | Advance | Planned | Connectivity | LogLine

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -11,54 +11,43 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from agents.assignment import assign
-from agents.movement_authority import Onset
+from agents.motion_planner import Option
+from agents.planning_job import Answer, Question
 from planning.foresight import length, walk
+from planning.reach_in_sight import time_in_sight
 from protocol.messages import Point
 
 if TYPE_CHECKING:
     from agents.leader import DeploymentPlanner, Plan
-    from agents.motion_planner import Course, MotionPlanner
+    from agents.motion_planner import MotionPlanner
+    from planning.environment import Environment
 
 Floats = NDArray[np.float64]
+
+LOOKED_AHEAD_S: Final = 60.0
 
 EXCHANGED: Final = "; robots exchange places, so that none has to overtake"
 """Added to the reason of a plan."""
 
 
-@dataclass(frozen=True, eq=False)
-class Question:
-    """What is known when a plan is asked for."""
-
-    way: tuple[Point, ...]
-    """The agent's, from where it is."""
-    onset: Onset
-    """Where the robots will be when a new motion can begin."""
-    lead_s: float
-    """How long it is until then."""
-    previous: Plan | None
-    """The plan before."""
-    heading: Mapping[str, Point]
-    """Where the motion under way leads; empty if there is none, or it does not lead to the goals."""
-    lost: Mapping[str, Floats] = field(default_factory=dict)
-    """(m, 2) each: where robots may be that are not heard any more."""
-
-
-@dataclass(frozen=True, eq=False)
-class Answer:
-    """A plan and the motion to it."""
-
-    plan: Plan
-    course: Course | None
-    """None: the motion under way leads there."""
-    failure: str = ""
-    """Why there is no course, if there should be one."""
-
-
 class TeamPlanner:
-    """Both planners, one after the other. Every answer is a function of the question alone."""
+    """Both planners, one after the other. Every answer is a function of the question alone.
 
-    def __init__(self, deployments: DeploymentPlanner, motions: MotionPlanner, agent_speed_m_s: float) -> None:
-        self._deployments, self._motions = deployments, motions
+    Args:
+        environment: the map as drawn.
+        deployments: who stands where.
+        motions: who goes how.
+        agent_speed_m_s: the most that the agent can go.
+    """
+
+    def __init__(
+        self,
+        environment: Environment,
+        deployments: DeploymentPlanner,
+        motions: MotionPlanner,
+        agent_speed_m_s: float,
+    ) -> None:
+        self._environment, self._deployments, self._motions = environment, deployments, motions
         self._agent_speed_m_s = agent_speed_m_s
 
     def plan(self, question: Question) -> Answer:
@@ -68,25 +57,27 @@ class TeamPlanner:
         robots = {name: place for name, place in onset.places.items() if name != self._motions.base}
         obstacles = [place for lost in question.lost.values() for place in _points(lost)]
         plan = self._deployments.plan(_point(way[0]), _points(way), robots, question.previous, obstacles)
-        plan = self._exchange(plan, robots, question.previous)
-        goals = {placement.robot: placement.position for placement in plan.placements}
-        if not robots or goals == question.heading:
-            return Answer(plan, None)
-        ends = tuple(
-            dict.fromkeys(
-                relays[-1]
-                for known in (plan, question.previous)
-                if known is not None
-                and (relays := [place.robot for place in known.placements if not place.spare and place.robot in robots])
-            )
-        )
+        last = _last_relay(plan)
+        watcher = onset.places[self._motions.base if last is None else last]
+        in_sight_s = min(LOOKED_AHEAD_S, self._time_in_sight(watcher, question))
+        if not robots or _goals(plan) == question.heading:
+            return Answer(plan, None, in_sight_s=in_sight_s)
+        exchanged = self._exchange(plan, robots, question.previous)
+        options = [_option(choice, question.previous, robots) for choice in dict.fromkeys((plan, exchanged))]
         try:
-            return Answer(plan, self._motions.plan(onset, goals, ends, way, question.lost))
+            course = self._motions.plan(onset, options, way, question.lost)
         except ValueError as problem:
-            return Answer(plan, None, str(problem))
+            return Answer(plan, None, str(problem), in_sight_s)
+        return Answer(plan if course.option is options[0] else exchanged, course, in_sight_s=in_sight_s)
+
+    def _time_in_sight(self, watcher: Point, question: Question) -> float:
+        """From the onset on; the agent may have gone anywhere until then."""
+        speed_m_s = self._agent_speed_m_s
+        gone_m = question.lead_s * speed_m_s
+        return time_in_sight(self._environment, watcher, question.way[0], speed_m_s, gone_m)
 
     def _exchange(self, plan: Plan, robots: Mapping[str, Point], previous: Plan | None) -> Plan:
-        """The same places, and nobody overtakes: the search for relays has not looked at who is in whose way."""
+        """The same places, but so that nobody overtakes: the search for relays does not ask who is in whose way."""
         before = {} if previous is None else {place.robot: place.position for place in previous.placements}
         names = assign(self._motions.geodesics, robots, [place.position for place in plan.placements], before)
         renamed = {place.robot: name for place, name in zip(plan.placements, names, strict=True)}
@@ -96,6 +87,20 @@ class TeamPlanner:
         edges = tuple((renamed.get(one, one), renamed.get(other, other)) for one, other in plan.edges)
         reason = plan.reason.removesuffix(EXCHANGED) + EXCHANGED
         return replace(plan, placements=placements, edges=edges, reason=reason)
+
+
+def _goals(plan: Plan) -> dict[str, Point]:
+    return {placement.robot: placement.position for placement in plan.placements}
+
+
+def _option(plan: Plan, before: Plan | None, robots: Collection[str]) -> Option:
+    relays = [_last_relay(known) for known in (plan, before) if known is not None]
+    return Option(_goals(plan), [name for name in dict.fromkeys(relays) if name is not None and name in robots])
+
+
+def _last_relay(plan: Plan) -> str | None:
+    relays = [placement.robot for placement in plan.placements if not placement.spare]
+    return relays[-1] if relays else None
 
 
 def _without(way: Floats, length_m: float) -> Floats:

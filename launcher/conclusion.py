@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from msgspec import json
 
-from launcher.report import Metrics, MissionTrace, measure
+from launcher.mission_trace import MissionTrace
+from launcher.report import Metrics, measure
 from launcher.review import merge, read_records
 from launcher.run_folder import RunFolder
 from planning.environment import Environment

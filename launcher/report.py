@@ -1,86 +1,25 @@
 """What a mission was worth: shares of time, counts and distances, measured on the true tracks of all peers.
 
-Simulation and review measure alike: both bring the records of a mission into a :class:`MissionTrace`.
+Simulation and review measure alike: both bring the records of a mission into a
+:class:`~launcher.mission_trace.MissionTrace`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from itertools import combinations
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Group
-from rich.table import Table
 
 from agents.base_station import silence_s
-from agents.mission import Mission
-from agents.records import AnyRecord, Decision, LogLine, Planned, Track
+from launcher.contacts import Overlap, find_overlaps
+from launcher.mission_trace import MissionTrace, Trail
 from planning.environment import Environment
-from protocol.messages import RoleName
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
-
-
-@dataclass(frozen=True, eq=False)
-class Trail:
-    """Where a peer truly was; empty for one that never recorded."""
-
-    peer: str
-    role: RoleName
-    radius_m: float
-    times_s: Floats
-    """(n,) float, mission time, rising."""
-    positions: Floats
-    """(n, 2) float, metres, map frame."""
-
-
-@dataclass(frozen=True, eq=False)
-class MissionTrace:
-    """What the peers of a mission recorded, in order of time."""
-
-    trails: tuple[Trail, ...]
-    """One for each peer on the roster, in roster order."""
-    decisions: tuple[tuple[float, Decision], ...]
-    planning_s: tuple[float, ...]
-    """Durations of all planning jobs."""
-    logs: tuple[tuple[float, str, LogLine], ...]
-    control_hz: float
-    duration_s: float
-
-    @classmethod
-    def of(
-        cls, records: Iterable[tuple[float, str, AnyRecord]], mission: Mission, duration_s: float | None = None
-    ) -> MissionTrace:
-        """Trace of (mission time, peer, record) in any order; it ends with the last of them if no duration is given."""
-        ordered = sorted(records, key=lambda entry: entry[0])
-        tracks: dict[str, list[tuple[float, Track]]] = {entry.name: [] for entry in mission.roster}
-        for time_s, peer, record in ordered:
-            if isinstance(record, Track) and peer in tracks:
-                tracks[peer].append((time_s, record))
-        trails = tuple(
-            Trail(
-                entry.name,
-                entry.role,
-                mission.agent_radius_m if entry.role == "tracked_agent" else mission.robot_radius_m,
-                np.array([time_s for time_s, _ in tracks[entry.name]], dtype=np.float64),
-                np.array([track.position for _, track in tracks[entry.name]], dtype=np.float64).reshape(-1, 2),
-            )
-            for entry in mission.roster
-        )
-        if duration_s is None:
-            duration_s = ordered[-1][0] if ordered else 0.0
-        return cls(
-            trails=trails,
-            decisions=tuple((time_s, record) for time_s, _, record in ordered if isinstance(record, Decision)),
-            planning_s=tuple(record.planning_s for _, _, record in ordered if isinstance(record, Planned)),
-            logs=tuple((time_s, peer, record) for time_s, peer, record in ordered if isinstance(record, LogLine)),
-            control_hz=mission.control_hz,
-            duration_s=duration_s,
-        )
 
 
 class Shares(msgspec.Struct, frozen=True, kw_only=True):
@@ -116,12 +55,17 @@ class TopologyChange(msgspec.Struct, frozen=True, kw_only=True):
     """No chain would have cost less that sees as much of the agent's way as the reason says."""
 
 
-class Overlap(msgspec.Struct, frozen=True, kw_only=True):
-    """Two discs, of robots or the agent, that lay over each other."""
+class CertifiedShares(msgspec.Struct, frozen=True, kw_only=True):
+    """Shares of ``seconds``, between 0 and 1, in which the motion ordered was certified to keep lines of sight."""
 
-    peers: tuple[str, str]
-    episodes: int
     seconds: float
+    """From the first motion on."""
+    agent: float
+    """The whole team and the agent's next moments are one network, whoever is late."""
+    team: float
+    """Base station and robots are."""
+    chain: float
+    """Base station and last relays are joined at least."""
 
 
 class Metrics(msgspec.Struct, frozen=True, kw_only=True):
@@ -143,7 +87,19 @@ class Metrics(msgspec.Struct, frozen=True, kw_only=True):
     planning: PlanningTimes | None
     decisions: int
     topology_changes: tuple[TopologyChange, ...]
+    plans: int
+    """Of motion: each but the first began because a robot was lost or heard anew, or did not follow the one before."""
+    motions: int
+    """Plans and their revisions."""
+    certified: CertifiedShares | None
+    agent_certain: float | None
+    """Share of the plans at which, wherever the agent went, the last relay would see it until the next plan is due."""
     overlaps: tuple[Overlap, ...]
+    """Of robots: none, if all is well."""
+    agent_contacts: tuple[Overlap, ...]
+    """Of robots and the agent, which goes where it likes."""
+    failures: tuple[str, ...]
+    """What must not happen, and did; sentences."""
     warnings: int
     errors: int
 
@@ -171,6 +127,8 @@ def measure(trace: MissionTrace, environment: Environment) -> Metrics:
     relays = [[place.robot for place in deployment.placements if not place.spare] for deployment in deployments]
     distance_m = {trail.peer: _distance_m(trail, trace.control_hz) for trail in trace.trails}
     robots = [trail.peer for trail in trace.trails if trail.role == "robot"]
+    contacts = tuple(find_overlaps(trace.trails, places, there, middles_s, lengths_s))
+    overlaps = tuple(contact for contact in contacts if set(contact.peers) <= set(robots))
     return Metrics(
         duration_s=trace.duration_s,
         first_deployment_s=first_s,
@@ -182,7 +140,7 @@ def measure(trace: MissionTrace, environment: Environment) -> Metrics:
         distance_m={peer: distance_m[peer] for peer in robots},
         total_distance_m=sum(distance_m[peer] for peer in robots),
         agent_distance_m=sum(distance_m[trail.peer] for trail in trace.trails if trail.role == "tracked_agent"),
-        planning=_planning_times(trace.planning_s),
+        planning=_planning_times([planned.planning_s for planned in trace.planned]),
         decisions=len(deployments),
         topology_changes=tuple(
             TopologyChange(
@@ -195,7 +153,16 @@ def measure(trace: MissionTrace, environment: Environment) -> Metrics:
             for time_s, decision in trace.decisions
             if decision.topology_changed
         ),
-        overlaps=_overlaps(trace, places, there, lengths_s),
+        plans=len({ordered.motion.plan for _, ordered in trace.motions}),
+        motions=len(trace.motions),
+        certified=_certified(trace),
+        agent_certain=_agent_certain(trace),
+        overlaps=overlaps,
+        agent_contacts=tuple(contact for contact in contacts if contact not in overlaps),
+        failures=tuple(
+            f"{' and '.join(overlap.peers)} overlapped {overlap.episodes} times, {overlap.seconds:.1f} s in all"
+            for overlap in overlaps
+        ),
         warnings=sum(line.level == "warning" for _, _, line in trace.logs),
         errors=sum(line.level == "error" for _, _, line in trace.logs),
     )
@@ -260,85 +227,29 @@ def _distance_m(trail: Trail, control_hz: float) -> float:
     return float(steps_m[np.diff(trail.times_s) <= silence_s(control_hz)].sum())
 
 
+def _certified(trace: MissionTrace) -> CertifiedShares | None:
+    """Each motion counts until the next one."""
+    if not trace.motions:
+        return None
+    begins_s = np.array([time_s for time_s, _ in trace.motions] + [trace.duration_s])
+    lengths_s = np.diff(begins_s)
+    orders = [ordered.motion for _, ordered in trace.motions]
+    agents = [any(way.member == trace.agent for way in motion.ways) for motion in orders]
+    team = np.array([motion.connection == "team" for motion in orders])
+    judged = np.column_stack((team & agents, team, team | [motion.connection == "joined" for motion in orders]))
+    seconds = float(lengths_s.sum())
+    agent, whole, chain = (judged.T @ lengths_s / seconds).tolist() if seconds > 0.0 else (0.0, 0.0, 0.0)
+    return CertifiedShares(seconds=seconds, agent=agent, team=whole, chain=chain)
+
+
+def _agent_certain(trace: MissionTrace) -> float | None:
+    if not trace.planned:
+        return None
+    return float(np.mean([planned.in_sight_s >= trace.planning_period_s for planned in trace.planned]))
+
+
 def _planning_times(planning_s: Sequence[float]) -> PlanningTimes | None:
     if not planning_s:
         return None
     median_s, p95_s, max_s = np.percentile(planning_s, (50, 95, 100)).tolist()
     return PlanningTimes(count=len(planning_s), median_s=median_s, p95_s=p95_s, max_s=max_s)
-
-
-def _overlaps(trace: MissionTrace, places: Floats, there: Bools, lengths_s: Floats) -> tuple[Overlap, ...]:
-    """Pairs of robots and agent that lay over each other; the base station is taken to be no obstacle."""
-    overlaps = []
-    bodies = [index for index, trail in enumerate(trace.trails) if trail.role != "base_station"]
-    for i, j in combinations(bodies, 2):
-        touching_m = trace.trails[i].radius_m + trace.trails[j].radius_m
-        over = (np.hypot(*(places[:, i] - places[:, j]).T) < touching_m - 1e-6) & there[:, i] & there[:, j]
-        if over.any():
-            episodes = int(over[0]) + int(np.count_nonzero(over[1:] & ~over[:-1]))
-            peers = (trace.trails[i].peer, trace.trails[j].peer)
-            overlaps.append(Overlap(peers=peers, episodes=episodes, seconds=float(lengths_s[over].sum())))
-    return tuple(overlaps)
-
-
-def render(metrics: Metrics) -> Group:
-    """The figures as tables for a terminal."""
-    shares = Table("share of time", "whole run", "since first deployment", title="Connected by true line of sight")
-    since = metrics.since_first_deployment
-    for title, key in (
-        ("agent visible to some robot or the base", "agent_visible"),
-        ("agent-base chain connected", "chain_connected"),
-        ("whole team connected", "team_connected"),
-    ):
-        shares.add_row(title, _percent(metrics.whole_run, key), "-" if since is None else _percent(since, key))
-    figures = Table.grid(padding=(0, 2))
-    planning = metrics.planning
-    overlapping_s = sum(overlap.seconds for overlap in metrics.overlaps)
-    for title, value in (
-        ("duration", f"{metrics.duration_s:.1f} s"),
-        (
-            "first deployment",
-            "none" if metrics.first_deployment_s is None else f"at {metrics.first_deployment_s:.2f} s of mission time",
-        ),
-        (
-            "robots used as relays",
-            f"{metrics.robots_used} of {metrics.robots}, {metrics.relays_at_most} at most at a time",
-        ),
-        (
-            "distance driven",
-            f"{metrics.total_distance_m:.1f} m: "
-            + ", ".join(f"{peer} {metres:.1f} m" for peer, metres in metrics.distance_m.items()),
-        ),
-        ("distance of the agent", f"{metrics.agent_distance_m:.1f} m"),
-        (
-            "planning",
-            "none"
-            if planning is None
-            else f"{planning.count} jobs, median {1e3 * planning.median_s:.1f} ms, "
-            f"95 % within {1e3 * planning.p95_s:.1f} ms, longest {1e3 * planning.max_s:.1f} ms",
-        ),
-        ("decisions", f"{metrics.decisions}, {len(metrics.topology_changes)} of them changed the topology"),
-        (
-            "overlapping discs",
-            f"{sum(overlap.episodes for overlap in metrics.overlaps)} times, {overlapping_s:.1f} s in all, "
-            f"{len(metrics.overlaps)} pairs (not avoided yet)",
-        ),
-        ("log", f"{metrics.warnings} warnings, {metrics.errors} errors, in the recording and in logs/"),
-    ):
-        figures.add_row(title, value)
-    parts: list[Table] = [shares, figures]
-    if metrics.topology_changes:
-        changes = Table("time", "decision", "reason", "cost", "at least", title="Topology changes")
-        for change in metrics.topology_changes:
-            costs = (_metres(change.total_cost_m), _metres(change.lower_bound_m))
-            changes.add_row(f"{change.time_s:.2f} s", str(change.decision), change.reason, *costs)
-        parts.append(changes)
-    return Group(*parts)
-
-
-def _metres(length_m: float | None) -> str:
-    return "-" if length_m is None else f"{length_m:.1f} m"
-
-
-def _percent(shares: Shares, key: str) -> str:
-    return f"{100.0 * float(getattr(shares, key)):.1f} %"

@@ -14,7 +14,7 @@ from agents.mission import Mission
 from agents.records import AnyRecord
 from agents.role import Compute, JobDone
 from agents.shell import PeerShell
-from launcher.report import MissionTrace
+from launcher.mission_trace import MissionTrace
 from planning.environment import Environment
 from protocol.bus import BusEvent
 from protocol.simulated_bus import SimulatedNetwork, VirtualTime

@@ -72,7 +72,7 @@ def _run(file: Path, name: str | None, duration_s: float | None) -> None:
 def _conclude(course: Course) -> None:
     """Merge and measure; say what came of it and where it is."""
     from launcher.conclusion import conclude
-    from launcher.report import render
+    from launcher.report_table import render
 
     folder = course.folder
     with busy("Merging the recordings ..."):

@@ -50,7 +50,7 @@ def review(
     from msgspec import to_builtins
 
     from launcher.conclusion import conclude, measure_run
-    from launcher.report import render
+    from launcher.report_table import render
     from launcher.review import open_viewer
     from launcher.run_folder import RunFolder
 
@@ -80,7 +80,8 @@ def _simulate(file: Path, seeds: int, duration_s: float | None, record: Path | N
     from rich.progress import Progress
 
     from launcher.preparation import prepare
-    from launcher.report import measure, render
+    from launcher.report import measure
+    from launcher.report_table import render
     from launcher.simulation import UNTIL_TOLD_S
     from launcher.simulation import simulate as simulate_mission
 

@@ -14,10 +14,10 @@ from msgspec import structs
 from agents.base_station import AGAIN_S, GRACE_S, PACE_S, BaseStation, silence_s
 from agents.leader import Plan
 from agents.mission import Mission
-from agents.motion_planner import Course
+from agents.motion_planner import Course, Option
+from agents.planning_job import Answer, Question
 from agents.records import Connectivity, Decision, Ordered, Planned, Track
 from agents.role import Compute, Effect, Heard, JobDone
-from agents.team_planner import Answer, Question
 from planning.environment import Environment
 from protocol.bus import PeerVanished
 from protocol.keys import Address
@@ -76,7 +76,7 @@ class Oracle:
             waypoints, stages = ((start, middle, goal), (0, 1, 2)) if start != goal else ((start,), (0, 0, 0))
             ways.append(MemberWay(member=name, radius_m=0.2, speed_m_s=1.0, waypoints=waypoints, stages=stages))
         motion = Motion(plan=0, revision=0, first_stage=0, released=-1, ways=tuple(ways), connection="none")
-        return Answer(self.answer, Course(onset.continued(motion), goals, True, self.reason))
+        return Answer(self.answer, Course(onset.continued(motion), Option(goals, ()), True, self.reason))
 
 
 class Team(Life):

@@ -12,7 +12,9 @@ from rich.console import Console
 
 from agents.mission import Mission
 from agents.records import AnyRecord, Decision, LogLine, Planned, Track
-from launcher.report import Metrics, MissionTrace, measure, render
+from launcher.mission_trace import MissionTrace
+from launcher.report import Metrics, measure
+from launcher.report_table import render
 from planning.environment import Environment
 from protocol.messages import Authority, Deployment, Placement, Point
 from tests.agents.conftest import make_mission

@@ -16,7 +16,8 @@ from msgspec import structs
 import maps
 from agents.mission import Behaviour, Mission, RosterEntry, Scripted, Wandering
 from agents.records import AnyRecord, Connectivity
-from launcher.report import MissionTrace, measure
+from launcher.mission_trace import MissionTrace
+from launcher.report import measure
 from launcher.simulation import simulate
 from planning.environment import Environment
 from protocol.messages import Point
@@ -61,7 +62,7 @@ def digest(trace: MissionTrace) -> str:
     content = hashlib.sha256()
     for trail in trace.trails:
         content.update(trail.times_s.tobytes() + trail.positions.tobytes())
-    content.update(msgspec.json.encode((trace.decisions, trace.planning_s, trace.logs)))
+    content.update(msgspec.json.encode((trace.decisions, trace.planned, trace.motions, trace.logs)))
     return content.hexdigest()
 
 

@@ -1,0 +1,87 @@
+"""The figures of missions as tables for a terminal."""
+
+from __future__ import annotations
+
+from rich.console import Group
+from rich.table import Table
+
+from launcher.contacts import Overlap
+from launcher.report import Metrics, Shares
+
+
+def render(metrics: Metrics) -> Group:
+    """The figures as tables for a terminal."""
+    shares = Table("share of time", "whole run", "since first deployment", title="Connected by true line of sight")
+    since = metrics.since_first_deployment
+    for title, key in (
+        ("agent visible to some robot or the base", "agent_visible"),
+        ("agent-base chain connected", "chain_connected"),
+        ("whole team connected", "team_connected"),
+    ):
+        shares.add_row(title, _percent(metrics.whole_run, key), "-" if since is None else _percent(since, key))
+    figures = Table.grid(padding=(0, 2))
+    planning = metrics.planning
+    for title, value in (
+        ("duration", f"{metrics.duration_s:.1f} s"),
+        (
+            "first deployment",
+            "none" if metrics.first_deployment_s is None else f"at {metrics.first_deployment_s:.2f} s of mission time",
+        ),
+        (
+            "robots used as relays",
+            f"{metrics.robots_used} of {metrics.robots}, {metrics.relays_at_most} at most at a time",
+        ),
+        (
+            "distance driven",
+            f"{metrics.total_distance_m:.1f} m: "
+            + ", ".join(f"{peer} {metres:.1f} m" for peer, metres in metrics.distance_m.items()),
+        ),
+        ("distance of the agent", f"{metrics.agent_distance_m:.1f} m"),
+        (
+            "planning",
+            "none"
+            if planning is None
+            else f"{planning.count} jobs, median {1e3 * planning.median_s:.1f} ms, "
+            f"95 % within {1e3 * planning.p95_s:.1f} ms, longest {1e3 * planning.max_s:.1f} ms",
+        ),
+        ("decisions", f"{metrics.decisions}, {len(metrics.topology_changes)} of them changed the topology"),
+        ("motion", _describe_motion(metrics)),
+        ("overlapping robots", _describe_contacts(metrics.overlaps)),
+        ("robots at the agent", _describe_contacts(metrics.agent_contacts) + ", as it goes where it likes"),
+        ("log", f"{metrics.warnings} warnings, {metrics.errors} errors, in the recording and in logs/"),
+    ):
+        figures.add_row(title, value)
+    parts: list[Table] = [shares, figures]
+    if metrics.topology_changes:
+        changes = Table("time", "decision", "reason", "cost", "at least", title="Topology changes")
+        for change in metrics.topology_changes:
+            costs = (_metres(change.total_cost_m), _metres(change.lower_bound_m))
+            changes.add_row(f"{change.time_s:.2f} s", str(change.decision), change.reason, *costs)
+        parts.append(changes)
+    return Group(*parts)
+
+
+def _describe_motion(metrics: Metrics) -> str:
+    if metrics.certified is None:
+        return "none"
+    certified = metrics.certified
+    plans = f"{metrics.plans} plan{'s' * (metrics.plans != 1)}, {metrics.motions - metrics.plans} revisions"
+    return (
+        f"{plans}; certified as one network {100 * certified.team:.1f} % of the time, with the agent's next moments "
+        f"{100 * certified.agent:.1f} %"
+    )
+
+
+def _describe_contacts(contacts: tuple[Overlap, ...]) -> str:
+    if not contacts:
+        return "never"
+    seconds = sum(contact.seconds for contact in contacts)
+    return f"{sum(contact.episodes for contact in contacts)} times, {seconds:.1f} s in all, {len(contacts)} pairs"
+
+
+def _metres(length_m: float | None) -> str:
+    return "-" if length_m is None else f"{length_m:.1f} m"
+
+
+def _percent(shares: Shares, key: str) -> str:
+    return f"{100.0 * float(getattr(shares, key)):.1f} %"
