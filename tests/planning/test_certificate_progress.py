@@ -142,7 +142,7 @@ def test_pieces_are_those_of_the_schedule_and_their_distances_those_of_shapely()
         assert not found
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(6))
 def test_hulls_are_free_where_the_planners_say_so_and_nowhere_else(seed: int) -> None:
     """Not stricter than they are, and not laxer by more than the depth makes."""
     environment = environment_of(seed)
@@ -152,7 +152,7 @@ def test_hulls_are_free_where_the_planners_say_so_and_nowhere_else(seed: int) ->
     wider = environment.polygon.buffer(2.0 * depth, join_style="mitre", mitre_limit=20.0)
     ends = np.concatenate([free_points(environment, 20, rng), wall_points(environment, 20, rng)])
     free = 0
-    for _ in range(300):
+    for _ in range(200):
         one = ends[rng.integers(0, len(ends), 1 + int(rng.integers(2)))]
         near = ends[np.argsort(np.hypot(*(ends - one[0]).T))[:12]]
         other = near[rng.integers(0, len(near), 1 + int(rng.integers(2)))]
@@ -163,7 +163,7 @@ def test_hulls_are_free_where_the_planners_say_so_and_nowhere_else(seed: int) ->
         hull = shapely.MultiPoint(np.concatenate([one, other])).convex_hull
         assert not certain or shapely.distance(wider.boundary, hull) > 0.0
         free += certain
-    assert free > 30
+    assert free > 20
 
 
 def test_networks_are_those_of_all_links_that_hold() -> None:
@@ -202,7 +202,7 @@ def test_no_mutant_is_accepted_that_breaks_the_rule_and_none_is_refused_without_
     name, radius = [("cityblocks", 0.2), ("", 0.12), ("", 0.1)][seed]
     ground = Ground(Environment.load(maps.path(name)) if name else environment_of(seed), radius)
     accepted = refused = 0
-    while accepted + refused < 21:
+    while accepted + refused < 14:
         schedule = random_staged(ground, 3, rng)
         if schedule is None:
             continue

@@ -49,14 +49,14 @@ def test_the_way_out_of_sight_bends_at_corners_that_hide_nothing() -> None:
 def test_watchers_that_move_are_as_good_as_the_worst_of_their_places() -> None:
     rng = np.random.default_rng(1)
     near = judged = 0
-    for seed in range(8):
+    for seed in range(5):
         environment = environment_of(seed)
         for start, end, target in free_points(environment, 60, rng).reshape(-1, 3, 2):
             way = np.array([start, start + min(1.0, 1.5 / np.hypot(*(end - start))) * (end - start)])
             if not environment.line_of_sight(*way):
                 continue
             certain = time_in_sight(environment, way, target, 1.0)
-            places = way[0] + np.linspace(0.0, 1.0, 40)[:, None] * (way[1] - way[0])
+            places = way[0] + np.linspace(0.0, 1.0, 25)[:, None] * (way[1] - way[0])
             worst = min(time_in_sight(environment, place, target, 1.0) for place in places)
             assert certain <= worst + 1e-9
             if worst > 0.0:
@@ -69,21 +69,21 @@ def test_watchers_that_move_are_as_good_as_the_worst_of_their_places() -> None:
 def test_sets_are_as_good_as_the_worst_of_their_places() -> None:
     rng = np.random.default_rng(2)
     judged = 0
-    for seed in range(8):
+    for seed in range(5):
         environment = environment_of(seed)
         for watcher, centre in free_points(environment, 24, rng).reshape(-1, 2, 2):
             radius = rng.uniform(0.05, 0.5)
             certain = time_in_sight(environment, watcher, centre, 1.0, radius)
-            turns = rng.uniform(0.0, 2.0 * np.pi, (40, 1))
+            turns = rng.uniform(0.0, 2.0 * np.pi, (25, 1))
             places = centre + radius * np.hstack([np.cos(turns), np.sin(turns)])
             places = places[environment.contains(places)]
             worst = min((time_in_sight(environment, watcher, place, 1.0) for place in places), default=np.inf)
             assert certain <= worst + 1e-9
-            if len(places) == 40 and worst > 0.0:
+            if len(places) == 25 and worst > 0.0:
                 judged += 1
-                assert certain > worst - 0.15 * radius - 1e-9
+                assert certain > worst - 0.2 * radius - 1e-9
             corners = centre + rng.normal(0.0, 0.3, (3, 2))
-            inside = rng.dirichlet(np.ones(3), 20) @ corners
+            inside = rng.dirichlet(np.ones(3), 10) @ corners
             inside = inside[environment.contains(inside)]
             certain = time_in_sight(environment, watcher, corners, 1.0)
             assert all(certain <= time_in_sight(environment, watcher, place, 1.0) + 1e-9 for place in inside)
@@ -102,7 +102,7 @@ def walks(environment: Environment, target: Floats) -> tuple[Floats, Floats]:
     return points, dijkstra(graph, directed=False, indices=[0])[0]
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(3))
 def test_nobody_walks_out_of_sight_sooner_and_somebody_does_hardly_later(seed: int) -> None:
     environment = environment_of(seed)
     rng = np.random.default_rng(seed)
