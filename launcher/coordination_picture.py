@@ -170,7 +170,7 @@ def _draw_course(axes: Axes, schedule: Schedule, pair: tuple[int, int]) -> None:
     if schedule.stages is not None:
         for member, draw in zip(pair, (axes.axvline, axes.axhline), strict=True):
             for metres in {*_borders(schedule, member)[1:-1]}:
-                draw(metres, color=_PROGRESS, linewidth=0.6, linestyle=(0, (2, 3)), zorder=2.5)
+                draw(metres, color=_PROGRESS, linewidth=0.4, linestyle=(0, (2, 4)), zorder=2.5)
 
 
 def _explain(axes: Axes, height_in: float, *, hidden: bool, stages: bool, near: bool) -> None:

@@ -132,9 +132,10 @@ def _draw_path(axes: Axes, schedule: Schedule, member: int, moves: Sequence[Move
             )
         if move.length_m * points_per_m >= _LEAST_PT:
             before = int(np.searchsorted(covered, middle)) - 1
-            dx, dy = (path[before + 1] - path[before]) / (covered[before + 1] - covered[before])
+            aside = 6.5 if member % 2 else -6.5  # so that those who go one way are told apart
+            dx, dy = aside * (path[before + 1] - path[before]) / (covered[before + 1] - covered[before])
             axes.annotate(
-                _name_stages(move), find_place(middle), (-6.5 * dy, 6.5 * dx), textcoords="offset points", color=colour,
+                _name_stages(move), find_place(middle), (-dy, dx), textcoords="offset points", color=colour,
                 fontsize=7.5, weight="bold", ha="center", va="center_baseline", zorder=4.9,
                 bbox={"boxstyle": "round,pad=0.08", "facecolor": "white", "edgecolor": "none", "alpha": 0.75},
             )  # fmt: skip
@@ -181,7 +182,7 @@ def _draw_order(axes: Axes, schedule: Schedule, moves: Sequence[Move], colours: 
             row[move.member], move.end_s - move.begin_s, left=move.begin_s, height=0.72, color=colours[move.member],
             edgecolor="white", linewidth=0.8,
         )  # fmt: skip
-        if move.end_s - move.begin_s > 0.012 * span * len(_name_stages(move)):
+        if move.end_s - move.begin_s > 0.009 * span * len(_name_stages(move)):
             axes.annotate(
                 _name_stages(move), (0.5 * (move.begin_s + move.end_s), row[move.member]), color="white", fontsize=7,
                 weight="bold", ha="center", va="center_baseline",

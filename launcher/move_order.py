@@ -11,13 +11,16 @@ from planning.motion_plan import Schedule
 
 Floats = NDArray[np.float64]
 
+SHORT_S = 0.1
+"""Shorter waits are no stops."""
+
 _AT_ONCE_S = 1e-6
 """Times that differ by less are one."""
 
 
 @dataclass(frozen=True, slots=True)
 class Move:
-    """What a member drives without a stop.
+    """What a member drives without a stop that lasts.
 
     Attributes:
         member: its row in the schedule.
@@ -66,12 +69,12 @@ def order_moves(schedule: Schedule) -> list[Move]:
         for stage in np.flatnonzero(lengths[member] > 0.0).tolist():
             begin, end, length = (float(of[member, stage]) for of in (begins, ends, lengths))
             waits = begin - (schedule.start_s if last is None else last.end_s)
-            if last is not None and waits <= _AT_ONCE_S:
+            if last is not None and waits < SHORT_S:
                 moves.pop()
                 last = replace(last, stages=(last.stages[0], stage + 1), length_m=last.length_m + length, end_s=end)
             else:
                 others: tuple[int, ...] = ()
-                if waits > _AT_ONCE_S and stage >= 2:
+                if waits >= SHORT_S and stage >= 2:
                     before = finished[:, stage - 2]
                     others = tuple(np.flatnonzero(before >= before.max() - _AT_ONCE_S).tolist())
                 driven = 0.0 if last is None else last.from_m + last.length_m

@@ -13,6 +13,7 @@ from launcher.console import LONGEST_S, busy, check_option, complain, out, plain
 from launcher.scenario import ScenarioFault, find_scenario
 
 if TYPE_CHECKING:
+    from launcher.report import Metrics
     from launcher.run import Course
 
 DEMO = "office"
@@ -61,15 +62,16 @@ def _run(file: Path, name: str | None, duration_s: float | None) -> None:
     from launcher.run import run as run_team
 
     course = run_team(file, name, duration_s, out)
-    _conclude(course)
-    if course.failure:
-        complain(course.failure)
+    failures = [*_conclude(course).failures, *([course.failure] if course.failure else [])]
+    for failure in failures:
+        complain(failure)
+    if failures:
         raise typer.Exit(1)
     if course.interrupted:
         raise typer.Exit(130)
 
 
-def _conclude(course: Course) -> None:
+def _conclude(course: Course) -> Metrics:
     """Merge and measure; say what came of it and where it is."""
     from launcher.conclusion import conclude
     from launcher.report_table import render
@@ -81,6 +83,7 @@ def _conclude(course: Course) -> None:
     tell(f"Recording  {folder.recording}")
     tell(f"Metrics    {folder.metrics_file}")
     tell(f"Open it    {_command()} review {folder.path}")
+    return metrics
 
 
 def _command() -> str:

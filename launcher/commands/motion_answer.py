@@ -25,7 +25,7 @@ LISTED = 24
 
 WAYS = {
     "direct": "direct, all by shortest ways",
-    "detour": "detours round those in the way",
+    "detour": "with detours",
     "stepwise": "step by step",
     "bridge": "over a deployment in between",
     "parted": "the network parts",
@@ -58,7 +58,7 @@ def tell_motion(planned: PlannedMotion) -> None:
 def _tell_move(move: Move, names: Sequence[str]) -> str:
     first, last = move.stages
     stages = f"stage {first}" if first == last else f"stages {first} to {last}"
-    text = f"  {names[move.member]:9} {move.begin_s:8.1f} to {move.end_s:8.1f} s  {move.length_m:8.1f} m  {stages}"
+    text = f"  {names[move.member]:9} {move.begin_s:8.1f} to {move.end_s:8.1f} s  {move.length_m:8.2f} m  {stages}"
     if move.waits_for:
         text += (
             f", after {move.waits_s:.1f} s of waiting for {' and '.join(names[member] for member in move.waits_for)}"

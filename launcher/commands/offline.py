@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from launcher.console import LONGEST_S, busy, check_option, err, out, plainly, print_json, tell
+from launcher.console import LONGEST_S, busy, check_option, complain, err, out, plainly, print_json, tell
 from launcher.scenario import ScenarioFault, find_scenario
 
 if TYPE_CHECKING:
@@ -64,6 +64,8 @@ def review(
             return
         tell(f"Run {folder.path}")
         out.print(render(metrics))
+        for failure in metrics.failures:
+            complain(f"failed: {failure}")
         if show:
             tell(open_viewer(folder.recording))
 
@@ -108,6 +110,7 @@ def _simulate(file: Path, seeds: int, duration_s: float | None, record: Path | N
     if as_json:
         missions = [{"seed": seed, **to_builtins(metrics)} for seed, metrics in results]
         print_json({"scenario": str(file), "took_s": round(took_s, 3), "missions": missions})
+        _judge(results)
         return
     if seeds == 1:
         out.print(render(results[0][1]))
@@ -117,6 +120,16 @@ def _simulate(file: Path, seeds: int, duration_s: float | None, record: Path | N
     tell(f"{seeds * length_s:.0f} s of missions in {took_s:.1f} s: {speed:.0f} times faster than real time")
     if record is not None:
         tell(f"Recording  {record}")
+    _judge(results)
+
+
+def _judge(results: list[tuple[int, Metrics]]) -> None:
+    """Say what must not happen and did, and end with a status that says so too."""
+    failures = [f"failed with seed {seed}: {failure}" for seed, metrics in results for failure in metrics.failures]
+    for failure in failures:
+        complain(failure)
+    if failures:
+        raise typer.Exit(1)
 
 
 def _open_recorder(preparation: Preparation, file: Path) -> RerunRecorder:

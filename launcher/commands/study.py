@@ -100,6 +100,20 @@ def redeployment(
         _conclude(study_redeployment(folder, number, seed, tell=tell), folder)
 
 
+@app.command()
+def motion(
+    number: Annotated[int, typer.Option(min=2, max=10_000, help="Redeployments of each map and team size.")] = 300,
+    seed: Annotated[int, typer.Option(min=0, help="Of the random places.")] = 0,
+    output: Output = None,
+) -> None:
+    """How often a team keeps its network on the way to the next deployment: at once, by the thesis' hybrid, by ours."""
+    with plainly():
+        folder = _made(output, "motion", "planning")
+        from launcher.studies.motion import study_motion
+
+        _conclude(study_motion(folder, number, seed, tell=tell), folder)
+
+
 def _made(output: Path | None, name: str, package: Literal["planning", "estimation"]) -> Path:
     """The folder to write to, made before any work is done for it; then the package's kernels.
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import islice
 from typing import Final, TypeAlias
 
 import numpy as np
@@ -38,6 +39,9 @@ AGENT: Final = 1
 
 SPEED_M_S: Final = 1.0
 """Of all members."""
+
+DRAWN: Final = 100
+"""At most so many redeployments are drawn for each that is asked for."""
 
 MOST_NODES: Final = 20_000
 """Of the hybrid's search, after which it gives up."""
@@ -163,11 +167,10 @@ class Journey:
 
 
 def find_journeys(ground: Ground, question: Question, number: int, seed: int) -> Iterator[Journey]:
-    """Random redeployments; without those in which robots are joined only by an agent that is not governed."""
-    for task in draw_tasks(ground.graph, question, number, seed):
-        journey = Journey.of(ground.graph, task, question.governed)
-        if journey.is_joined:
-            yield journey
+    """Random redeployments; of those in which only an agent that is not governed joins robots others are drawn."""
+    tasks = draw_tasks(ground.graph, question, DRAWN * number, seed)
+    journeys = (Journey.of(ground.graph, task, question.governed) for task in tasks)
+    return islice((journey for journey in journeys if journey.is_joined), number)
 
 
 def answer_all(ground: Ground, question: Question, number: int, seed: int) -> list[MotionAnswer]:

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from launcher.move_order import order_moves
+from launcher.move_order import SHORT_S, order_moves
 from planning.motion_plan import Schedule, TimedPath
 from planning.schedule import schedule
 
@@ -49,9 +49,9 @@ def test_moves_cover_all_paths_and_waits_end_when_those_waited_for_arrive() -> N
         assert np.allclose([move.from_m for move in own], np.cumsum([0, *(move.length_m for move in own)])[:-1])
         for before, after in pairwise(own):
             assert after.begin_s - before.end_s == pytest.approx(after.waits_s)
-            assert after.waits_s > 0.0
+            assert after.waits_s >= SHORT_S
             assert after.stages[0] > before.stages[1]
-    waiting = [move for move in moves if move.waits_s]
+    waiting = [move for move in moves if move.waits_s >= SHORT_S]
     assert waiting
     assert found.stages is not None
     for move in waiting:
