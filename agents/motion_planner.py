@@ -22,7 +22,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 from msgspec import structs
@@ -92,6 +92,17 @@ class Course:
     """Why not everybody arrives, or stays in sight of all others; a sentence."""
 
 
+class Candidate(NamedTuple):
+    """A motion that could be ordered."""
+
+    worth_s: float
+    """Seconds of a chain that holds, less what is missing."""
+    laxity: int
+    """How many stricter demands there are."""
+    option: Option
+    found: TeamMotion
+
+
 class MotionPlanner:
     """Plans motions. Every answer is a function of its arguments alone.
 
@@ -129,18 +140,17 @@ class MotionPlanner:
         prospect = Prospect(self._environment, way, self._mission.agent_speed_m_s)
         hoped_s = max(prospect.worth(self._at_once(onset, option, prospect.times_s)) for option in options)
         members = len(onset.places)  # those that go as they please come last
-        reason, best, best_s = "", None, -math.inf
+        candidates: list[Candidate] = []
         for laxity, option, joined in self._demands(onset, options):
             found = self._find(onset, option, joined, way, list(obstacles.values()))
-            worth_s = prospect.worth(found.schedule.positions(prospect.times_s)[:, :members])
-            worth_s -= LAXITY_S * laxity + STRANDED_S * (not found.arrives)
-            if best is None or worth_s > best_s:
-                best, best_s = (option, found), worth_s
-            if found.arrives and worth_s >= hoped_s - LAXITY_S * laxity - SLOWER_S:
+            holds_s = prospect.worth(found.schedule.positions(prospect.times_s)[:, :members])
+            worth_s = holds_s - LAXITY_S * laxity - STRANDED_S * (not found.arrives)
+            candidates.append(Candidate(worth_s, laxity, option, found))
+            if found.arrives and holds_s >= hoped_s - SLOWER_S:
                 break
-            reason = reason or found.reason
-        assert best is not None
-        return self._certify(onset, *best, obstacles, reason)
+        best = max(candidates, key=lambda candidate: candidate.worth_s)
+        less = best.laxity > 1 or not best.found.arrives
+        return self._certify(onset, best.option, best.found, obstacles, candidates[0].found.reason if less else "")
 
     def _find(
         self, onset: Onset, option: Option, joined: frozenset[str], way: Floats, obstacles: Sequence[Floats]
