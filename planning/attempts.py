@@ -20,6 +20,7 @@ from planning.detour import (
     shortest_paths,
     space_around_standing,
 )
+from planning.geodesic import GeodesicMap
 from planning.motion_plan import Schedule
 from planning.move_search import Moves
 from planning.no_schedule import NoSchedule
@@ -129,13 +130,13 @@ class Attempts:
         if blocked:
             mover, stander = (task.members[row] for row in blocked[0])
             self._blame(f"{stander} stands in the way of {mover}", (mover, stander))
-            paths = paths_around(task, paths, [row for row, _ in blocked], space_around_standing(task))
+            paths = paths_around(task, paths, [row for row, _ in blocked], self._space)
             if blocked_by_standing(task, paths):
                 return
         yield paths, "detour" if blocked else "direct"
         rows = [task.names.index(name) for name in self.between or ()]
         if rows:
-            for others in islice(other_paths(task, paths, rows, space_around_standing(task)), OTHER_SCHEDULES):
+            for others in islice(other_paths(task, paths, rows, self._space), OTHER_SCHEDULES):
                 yield others, "detour"
 
     def _ease(self, staged: Schedule, level: Level) -> Iterator[tuple[Schedule, ArrivingWay]]:
@@ -161,6 +162,10 @@ class Attempts:
         yield self._crew
         if self._yielding:
             yield self._larger_crew
+
+    @cached_property
+    def _space(self) -> GeodesicMap:
+        return space_around_standing(self._task)
 
     @cached_property
     def _crew(self) -> Steps:

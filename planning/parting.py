@@ -25,7 +25,7 @@ class Parting:
     Attributes:
         break_s: for how long, seconds; inf if it ends so.
         between: two members that part first; None if nobody parts.
-        text: who parts, where and when.
+        text: who parts, where and when; a sentence.
     """
 
     break_s: float
@@ -40,7 +40,7 @@ def find_parting(task: TeamTask, schedule: Schedule) -> Parting:
         (violation.time_s, violation.until_s) for violation in judged.violations if violation.kind == "connection"
     ]
     if not breaks:
-        return Parting(0.0, None, "")
+        return Parting(0.0, None, "nobody parts at full speed, but somebody may if others are late")
     first = next(violation for violation in judged.violations if violation.kind == "connection")
     one, other = first.members
     row = schedule.members.index(one)
