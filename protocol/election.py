@@ -95,6 +95,7 @@ class Election:
         self._incarnation = incarnation
         self._chance = Random(f"{seed}/{name}/{incarnation}/election")
         self._ballot: Ballot | None = None
+        self._canvass: Ballot | None = None
         self._highest_epoch = promise.epoch if promise else 0
         self._marks: dict[str, str] = {}
         self._rounds = self._token = 0
@@ -144,16 +145,21 @@ class Election:
         if request.withdrawn:
             voter.release(reign, now_s)
             return
+        free = self.standing in (Standing.WAITING, Standing.CANVASSING, Standing.FOLLOWING)
+        if request.canvass:
+            self._say_vote(reign.leader, request.correlation, free and voter.may_promise(reign, now_s), now_s)
+            return
         if request.warrant is not None:
             self._leader_heard_s = now_s
         self._make_way(reign.leader, request.warrant is not None, now_s)
-        granted = self.standing in (Standing.WAITING, Standing.FOLLOWING) and voter.renew(reign, now_s)
+        free = self.standing in (Standing.WAITING, Standing.CANVASSING, Standing.FOLLOWING)
+        granted = free and voter.renew(reign, now_s)
         if granted:
             self._go(Occurrence.PROMISED, now_s)
         elif reign == voter.writing:
             self._reply_to = (reign.leader, request.correlation)
             return
-        elif self.standing in (Standing.WAITING, Standing.FOLLOWING) and voter.may_promise(reign, now_s):
+        elif free and voter.may_promise(reign, now_s):
             self._reply_to = (reign.leader, request.correlation)
             self._write(reign, now_s)
             return
@@ -163,16 +169,20 @@ class Election:
 
     def _make_way(self, peer: str, leads: bool, now_s: float) -> None:
         """Stand no longer if the other leads or is listed before; not when the decisive vote is being cast."""
-        if self.standing is not Standing.CANDIDATE or self._voter.writing is not None:
-            return
-        order = self._roster.voters.index
-        if leads or order(peer) < order(self._name):
-            self._withdraw(now_s)
+        if self.standing is Standing.CANVASSING and leads:
             self._go(Occurrence.OUTRANKED, now_s)
+        elif self.standing is Standing.CANDIDATE and self._voter.writing is None:
+            order = self._roster.voters.index
+            if leads or order(peer) < order(self._name):
+                self._withdraw(now_s)
+                self._go(Occurrence.OUTRANKED, now_s)
 
     def _count(self, peer: str, vote: Vote, now_s: float) -> None:
         """Take note of a peer's mark and promise, and of its vote if it is one for this peer."""
         self._marks[peer] = vote.mark
+        if self._canvass is not None and vote.granted and vote.candidate == self._name and peer in self._roster.voters:
+            self._canvass.count(peer, vote.correlation)
+            self._use_canvass(now_s)
         promise, ballot = vote.promise, self._ballot
         if promise is None or promise.epoch > self._highest_epoch + LARGEST_LEAP:
             return
@@ -250,12 +260,31 @@ class Election:
             self._leave_office("no majority has renewed its lease")
             self._go(Occurrence.LEASE_ENDED, now_s)
         if self.standing is Standing.WAITING and self._voter.is_free(now_s) and now_s >= self._stands_at_s:
-            self._candidate_until_s, self._next_round_s = now_s + CANDIDACY_S, now_s
-            self._open_ballot()
+            self._next_round_s = now_s
             self._go(Occurrence.PATIENCE_ENDED, now_s)
+        if self.standing is Standing.CANVASSING and now_s >= self._next_round_s:
+            self._ask_who_would(now_s)
         if self.standing in (Standing.CANDIDATE, Standing.LEADING) and now_s >= self._next_round_s:
             self._ask(now_s)
         self._effects += self.obedience.changes(now_s)
+
+    def _ask_who_would(self, now_s: float) -> None:
+        """Say a round of canvassing."""
+        reign = self._reign(self._highest_epoch + 1)
+        if self._canvass is None or self._canvass.reign != reign:
+            self._canvass = Ballot(reign, self._roster, LEASE_S)
+        correlation = self._next_correlation()
+        self._canvass.ask(correlation, now_s)
+        self._effects.append(Say(VoteRequest(epoch=reign.epoch, correlation=correlation, canvass=True)))
+        self._next_round_s = now_s + ROUND_S
+        self._use_canvass(now_s)
+
+    def _use_canvass(self, now_s: float) -> None:
+        """Stand if enough would promise their votes, and one's own is free still."""
+        if self._canvass is not None and self._canvass.wants_only(self._name, now_s) and self._voter.is_free(now_s):
+            self._candidate_until_s, self._next_round_s = now_s + CANDIDACY_S, now_s
+            self._open_ballot()
+            self._go(Occurrence.ENCOURAGED, now_s)
 
     def _ask(self, now_s: float) -> None:
         """Say a round of requests; what is asked counts from now."""
@@ -265,8 +294,7 @@ class Election:
         assert ballot is not None
         if ballot.is_cast_by(self._name) and self._voter.renew(ballot.reign, now_s):
             ballot.count_from(self._name, now_s)
-        self._rounds += 1
-        correlation = f"{self._incarnation}.{self._rounds}"
+        correlation = self._next_correlation()
         ballot.ask(correlation, now_s)
         warrant = self.warrant(now_s) if ballot.reign == self.office else None
         self._effects.append(Say(VoteRequest(epoch=ballot.reign.epoch, correlation=correlation, warrant=warrant)))
@@ -274,6 +302,10 @@ class Election:
         if warrant is not None:
             self.obedience.heed(ballot.reign, warrant, now_s)
         self._use_votes(now_s)
+
+    def _next_correlation(self) -> str:
+        self._rounds += 1
+        return f"{self._incarnation}.{self._rounds}"
 
     def _open_ballot(self) -> None:
         self._outdated = False
@@ -309,6 +341,8 @@ class Election:
 
     def _go(self, occurrence: Occurrence, now_s: float) -> None:
         self.standing = TRANSITIONS[self.standing][occurrence]
+        if self.standing is not Standing.CANVASSING:
+            self._canvass = None
         if self.standing is Standing.WAITING:
             self._waiting_since_s, self._patience_s = now_s, self._draw_patience_s()
 
@@ -328,6 +362,8 @@ class Election:
                 return min(wake_s, self._voter.runs_until_s)
             case Standing.WAITING if self._voter.writing is None:
                 return min(wake_s, max(self._stands_at_s, self._voter.runs_until_s))
+            case Standing.CANVASSING:
+                return min(wake_s, self._next_round_s)
             case Standing.CANDIDATE:
                 return min(wake_s, self._candidate_until_s, self._next_round_s)
             case Standing.LEADING:

@@ -20,6 +20,8 @@ class Standing(Enum):
     """It has just started, or could not write: it promises nothing for a while."""
     WAITING = "waiting"
     """It is free to promise. If nobody asks it will stand itself."""
+    CANVASSING = "canvassing"
+    """It asks who would promise, and binds nobody: who is cut off with a few others gets no further than this."""
     FOLLOWING = "following"
     """Its promise to another peer is running."""
     CANDIDATE = "candidate"
@@ -35,6 +37,7 @@ class Occurrence(Enum):
     PROMISED = "a promise to another is on disk"
     PROMISE_ENDED = "the promise has run out or is void"
     PATIENCE_ENDED = "nobody has led for a lease and its waiting time"
+    ENCOURAGED = "a majority would promise"
     ELECTED = "a majority has voted, its own vote is on disk"
     OUTRANKED = "hears a leader, or a candidate listed before it"
     NOT_ELECTED = "no majority in half a lease"
@@ -49,7 +52,13 @@ TRANSITIONS: Final[dict[Standing, dict[Occurrence, Standing]]] = {
     },
     Standing.WAITING: {
         Occurrence.PROMISED: Standing.FOLLOWING,
-        Occurrence.PATIENCE_ENDED: Standing.CANDIDATE,
+        Occurrence.PATIENCE_ENDED: Standing.CANVASSING,
+        Occurrence.WRITE_FAILED: Standing.RESTING,
+    },
+    Standing.CANVASSING: {
+        Occurrence.PROMISED: Standing.FOLLOWING,
+        Occurrence.ENCOURAGED: Standing.CANDIDATE,
+        Occurrence.OUTRANKED: Standing.WAITING,
         Occurrence.WRITE_FAILED: Standing.RESTING,
     },
     Standing.FOLLOWING: {

@@ -241,13 +241,15 @@ class Warrant(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class VoteRequest(Body, frozen=True, kw_only=True, tag="vote_request"):
-    """Promise me the lease of this epoch, or renew your promise. Said in rounds by who stands for leader or leads."""
+    """Promise me the lease of this epoch, or renew your promise. Said in rounds by who would lead, stands or leads."""
 
     epoch: Count
     correlation: Correlation
     """Of this round."""
     warrant: Warrant | None = None
     """Of a leader in office; none while it only stands."""
+    canvass: bool = False
+    """Promise nothing yet, but say whether you would."""
     withdrawn: bool = False
     """It has not won, and will not lead in this epoch or one before: promises of these are void. Wants no answer."""
 
@@ -258,7 +260,7 @@ class Vote(Body, frozen=True, kw_only=True, tag="vote"):
     candidate: Name
     correlation: Correlation
     granted: bool
-    """Whether nobody else will be promised a lease from now on for as long as one lasts."""
+    """Whether nobody else will be promised a lease for one lease from now on; to a canvass, whether it would be so."""
     promise: Reign | None = None
     """The last one made; it is on disk. Of a peer that has no vote: whom it obeyed last."""
     mark: Correlation

@@ -33,8 +33,8 @@ import msgspec
 
 from protocol.ballot import Ballot
 from protocol.core import Heard, Persist, Say, Tick, Written
-from protocol.election import LEASE_S, Election, Leads
-from protocol.election_states import Standing
+from protocol.election import CANDIDACY_S, LEASE_S, Election, Leads
+from protocol.election_states import Occurrence, Standing
 from protocol.messages import Reign, Vote, VoteRequest, Warrant
 from protocol.obedience import Obedience, Refusal
 from protocol.promises import decode_promise
@@ -47,12 +47,20 @@ NEVER_S: Final = 1e9
 
 
 class ExploredElection(Election):
-    """Never stands by itself, and falls silent after some rounds: the exploration decides on both."""
+    """Never stands by itself, and falls silent after some rounds: the exploration decides on both.
+
+    It canvasses nobody: a canvass binds nobody, and whoever could be encouraged may stand here at any moment.
+    """
 
     most_rounds = 99
 
     def _draw_patience_s(self) -> float:
         return NEVER_S
+
+    def _ask_who_would(self, now_s: float) -> None:
+        self._candidate_until_s = now_s + CANDIDACY_S
+        self._open_ballot()
+        self._go(Occurrence.ENCOURAGED, now_s)
 
     def _ask(self, now_s: float) -> None:
         if self._rounds < self.most_rounds:

@@ -33,6 +33,8 @@ class Peer:
         self.paused = False
         self.waiting: list[Callable[[], None]] = []
         """What arrived while it was paused."""
+        self.wakings = 0
+        """Asked for; only the last one counts."""
         self.writing: bytes | None = None
         self.orders = 0
         """Given by this process."""
@@ -175,14 +177,15 @@ class Team:
                 case WakeAt(wake_s) if wake_s < math.inf:
                     # Where the clocks' roundings differ it is woken a little late, never a little early.
                     due_s = max(0.0, (wake_s - now_s) / peer.rate) + 1e-6
-                    self._later((due_s, due_s), peer, partial(self._wake, peer))
+                    peer.wakings += 1
+                    self._later((due_s, due_s), peer, partial(self._wake, peer, peer.wakings))
         self.check()
 
     def _hear(self, heard: Heard, peer: Peer) -> None:
         self._handle(peer, heard)
 
-    def _wake(self, peer: Peer) -> None:
-        if not peer.paused:
+    def _wake(self, peer: Peer, waking: int) -> None:
+        if not peer.paused and waking == peer.wakings:
             self._handle(peer, Tick())
 
     def _written(self, peer: Peer, content: bytes, token: int) -> None:
