@@ -21,7 +21,8 @@ import msgspec
 from rerun.chunk import RrdReader
 from rerun.experimental import ViewerClient
 
-from agents.recorder import JOURNAL, TIMELINE
+from agents.recorder import JOURNAL
+from agents.recorder_layout import TIMELINE
 from agents.records import AnyRecord
 from launcher.run_folder import RunFolder
 

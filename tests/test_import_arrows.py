@@ -17,10 +17,18 @@ ALLOWED = {
     "agents": {"agents", "planning", "estimation", "protocol"},
     "launcher": {"launcher", "agents", "planning", "estimation", "protocol", "maps"},
 }
+RECORDINGS = {
+    "agents/recorder.py",
+    "agents/recorder_columns.py",
+    "agents/recorder_file.py",
+    "agents/recorder_layout.py",
+    "agents/recorder_style.py",
+    "launcher/review.py",
+}
 GATES = {
     "zenoh": {"protocol/zenoh_bus.py", "protocol/security.py"},
-    "rerun": {"agents/recorder.py", "launcher/review.py"},
-    "rerun_bindings": {"agents/recorder.py", "launcher/review.py"},
+    "rerun": RECORDINGS,
+    "rerun_bindings": RECORDINGS,
 }
 
 

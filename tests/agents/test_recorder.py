@@ -10,14 +10,16 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
+from msgspec import structs
 from PIL import Image
 from rerun.chunk import RrdReader
 
 from agents.map_picture import OBSTACLE, draw_map
 from agents.recorder import NullRecorder, Recorder, RerunRecorder
-from agents.records import AnyRecord, Connectivity, LogLine, Track
+from agents.records import Advance, AnyRecord, Connectivity, LogLine, Ordered, Planned, Track
 from agents.tree_layout import lay_out
 from planning.environment import Environment
+from protocol.messages import MemberWay, Motion
 from tests.agents import synthetic_mission as synthetic
 
 Row = tuple[float | None, Any]
@@ -174,7 +176,7 @@ def test_decisions_and_log_lines_are_not_held_back(tmp_path: Path) -> None:
     for time_s, record in synthetic.tracks("base", 0.0, 0.3):
         recorder.record(time_s, "base", record)
     recorder.record(0.3, "base", LogLine(level="error", text="something broke"))
-    assert not recorder._rows
+    assert not recorder._file._rows
     recorder.close()
 
 
@@ -235,3 +237,40 @@ def test_nodes_of_a_tree_stand_in_columns_by_hops_and_never_on_each_other() -> N
 
 def test_a_tree_without_edges_still_shows_its_root() -> None:
     assert lay_out([], "base") == {"base": (0.0, 0.0)}
+
+
+def way(member: str, *waypoints: tuple[float, float], scheduled: bool = True) -> MemberWay:
+    """A stage for each piece of three, standing in the last ones."""
+    last = len(waypoints) - 1
+    return MemberWay(
+        member=member, radius_m=0.2, speed_m_s=1.0, waypoints=waypoints, scheduled=scheduled,
+        stages=(0, min(1, last), min(2, last), last),
+    )  # fmt: skip
+
+
+def test_a_motion_is_drawn_with_its_stages_and_how_far_everybody_is(tmp_path: Path) -> None:
+    recorder = RerunRecorder(tmp_path / "motion.rrd", team="demo", recording_id="run", peer="base")
+    recorder.log_blueprint(synthetic.mission())
+    ways = (
+        way("base", (1.0, 1.0)),
+        way("robot_1", (10.0, 2.0), (11.0, 2.0), (12.0, 2.0), (13.0, 2.0)),
+        way("robot_2", (2.0, 10.0), (2.0, 11.0)),
+    )
+    agent = way("agent", (16.0, 10.0), (16.0, 11.0), scheduled=False)
+    motion = Motion(plan=0, revision=3, first_stage=5, released=-1, ways=ways, connection="joined", joined=("base",))
+    recorder.record(1.0, "base", Ordered(motion=motion))
+    recorder.record(1.1, "base", Advance(released=6, finished={"robot_1": 5, "robot_2": 6}))
+    recorder.record(2.0, "base", Ordered(motion=structs.replace(motion, connection="team", ways=(*ways, agent))))
+    recorder.record(2.1, "base", Planned(planning_s=0.01, in_sight_s=4.5))
+    recorder.close()
+    file = tmp_path / "motion.rrd"
+    drawn = rows(file, "world/motion/ways", "LineStrips2D:strips")
+    assert [[len(strip) for strip in strips] for time_s, strips in drawn if time_s is not None] == [[4, 2], [4, 2]]
+    ends = rows(file, "world/motion/stages", "Points2D:positions")[-1][1]
+    assert {tuple(place) for place in ends} >= {(11.0, 2.0), (12.0, 2.0), (13.0, 2.0), (2.0, 11.0)}
+    # Stages 5 and 6 of robot_1; robot_2 has nothing more to do in stage 6.
+    (released,) = [strips for time_s, strips in rows(file, "world/motion/released", "LineStrips2D:strips") if time_s]
+    assert [[tuple(place) for place in strip] for strip in released] == [[(10.0, 2.0), (11.0, 2.0), (12.0, 2.0)]]
+    assert [value for _, value in rows(file, "in_hand", "Scalars:scalars")] == [[2.0, 1.0]]
+    assert [value for _, value in rows(file, "certified", "Scalars:scalars")] == [[1.0], [3.0]]
+    assert [value for _, value in rows(file, "in_sight_s", "Scalars:scalars")] == [[4.5]]

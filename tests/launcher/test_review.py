@@ -149,7 +149,8 @@ def test_a_killed_process_leaves_what_it_recorded(run_folder: Path, tmp_path: Pa
     program = """
         import os, signal, sys, time
         from pathlib import Path
-        from agents.recorder import FLUSH_PERIOD_S, RerunRecorder
+        from agents.recorder import RerunRecorder
+        from agents.recorder_file import FLUSH_PERIOD_S
         from tests.agents import synthetic_mission as synthetic
 
         recorder = RerunRecorder(Path(sys.argv[1]), team="demo", recording_id="the-run", peer="agent")
