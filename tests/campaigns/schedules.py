@@ -60,7 +60,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--redeployments", type=int, default=40, help="of each map and number of members")
     parser.add_argument("--members", type=int, nargs="+", default=[4, 6, 8], help="base and agent among them")
-    parser.add_argument("--cells", action="store_true", help="deploy on aspect cells, not on points")
+    parser.add_argument("--cells", action="store_true", help="deploy on inflection cells, not on points")
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
     compared: Counter[tuple[bool, bool]] = Counter()
@@ -68,7 +68,7 @@ def main() -> int:
     columns = ("members", "found", "proven none", "given up", "median ms", "p99 ms", "late")
     print(f"{'map':<12}" + "".join(f"{column:>13}" for column in columns))
     for name in MAPS:
-        ground = load_ground(name, "aspect" if options.cells else None)
+        ground = load_ground(name, "inflection" if options.cells else None)
         for members in options.members:
             radii = np.append(0.0, np.full(members - 1, RADIUS_M))
             outcomes: Counter[str] = Counter()
