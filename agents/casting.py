@@ -52,7 +52,7 @@ class Casting:
         mission, entry = self._mission, self._mission.entry(name)
         match entry.role:
             case "base_station":
-                return BaseStation(mission, self._environment, self._team_planner()), DiscDriver(entry.start, 0.0)
+                return BaseStation(mission, self._environment, self.team_planner()), DiscDriver(entry.start, 0.0)
             case "tracked_agent":
                 radius_m, speed_m_s = mission.agent_radius_m, mission.agent_speed_m_s
                 space = self._space(radius_m, entry.start)
@@ -73,7 +73,8 @@ class Casting:
             self._known_planner = self._build_planner()
         return self._known_planner
 
-    def _team_planner(self) -> TeamPlanner:
+    def team_planner(self) -> TeamPlanner:
+        """What the leader plans with. Raises as :meth:`planner`."""
         from agents.motion_planner import MotionPlanner
         from agents.team_planner import TeamPlanner
 

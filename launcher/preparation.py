@@ -14,6 +14,8 @@ import numpy as np
 from agents.casting import Casting
 from agents.leader import MOST_TO_PLAN_ON, DeploymentPlanner, remedy_for
 from agents.mission import Behaviour, Mission, OnDemand, RosterEntry, Scripted, Wandering
+from agents.movement_authority import Onset
+from agents.planning_job import Question
 from launcher.ground import Ground, named
 from launcher.kernels import warm_up
 from launcher.scenario import Scenario, ScenarioFault, find_map, read_scenario
@@ -80,14 +82,31 @@ def prepare(file: Path, announce: Callable[[str], None]) -> Preparation:
         announce(f"Preparing the planner for a map of {len(environment.vertices)} vertices ...")
     if mission.placements == "cells":
         _check_cells(file, mission, environment)
+    casting = Casting(mission, environment)
     try:
-        planner = Casting(mission, environment).planner()
+        planner = casting.planner()
     except TooManyCells as problem:
         raise ScenarioFault(f"{file}: map: {problem}") from problem
     except UnfitSpacing as problem:
         raise ScenarioFault(f"{file}: planning.spacing_m: {problem}") from problem
+    _rehearse(file, mission, casting)
     warnings = (*_check_robots_suffice(file, scenario, planner), *_check_pace(scenario))
     return Preparation(scenario, environment, mission, planner, warnings)
+
+
+def _rehearse(file: Path, mission: Mission, casting: Casting) -> None:
+    """Plan the first motion: what cannot be begun is found now, and what planning loads is there when the team begins.
+
+    Raises:
+        ScenarioFault: the robots cannot set out from their places.
+    """
+    places = {entry.name: entry.start for entry in (mission.base_station, *mission.robots)}
+    question = Question(
+        way=(mission.tracked_agent.start,), onset=Onset(0, 0, 0, places), lead_s=0.0, previous=None, heading={}
+    )
+    answer = casting.team_planner().plan(question)
+    if answer.failure:
+        raise ScenarioFault(f"{file}: robots.starts: the robots cannot set out from there: {answer.failure}")
 
 
 def _check_cells(file: Path, mission: Mission, environment: Environment) -> None:
