@@ -58,7 +58,7 @@ class Team:
         """The team of a plan.
 
         The base station has no body. How large agents are a plan is not told: they are taken as large as robots; where
-        they stand between walls and robots, as large as there is room for. Robots that are sent to one place stand
+        they stand between walls and others, as large as there is room for. Robots that are sent to one place stand
         beside each other.
 
         Args:
@@ -77,9 +77,10 @@ class Team:
         radii[0] = 0.0
         for row, (start, goal) in enumerate(agents, 1):
             if start == goal:
-                wall = shapely.distance(environment.polygon.boundary, shapely.Point(start))
-                beside = min((math.dist(start, place) for place in starts[fixed:]), default=math.inf)
-                radii[row] = max(0.0, min(radius_m, wall, beside - radius_m))
+                wall = float(shapely.distance(environment.polygon.boundary, shapely.Point(start)))
+                room = [math.dist(start, place) - radius_m for place in starts[fixed:]]
+                room += [0.5 * math.dist(start, starts[other]) for other in range(1, fixed) if other != row]
+                radii[row] = max(0.0, min([radius_m, wall, *room]))
 
         def fits(row: int, place: Floats, chosen: Floats) -> bool:
             seen = chosen[[v if u == row else u for u, v in tree if row in (u, v)]]

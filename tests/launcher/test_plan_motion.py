@@ -142,3 +142,12 @@ def test_standing_apart_moves_nobody_who_has_room() -> None:
     stuck = stand_apart(places, [0, 4], radii, lambda *_: False)
     np.testing.assert_array_equal(stuck, places)
     assert [*overlapping(stuck, radii)] == [(1, 2), (1, 4), (2, 4)]
+
+
+def test_agents_are_as_large_as_there_is_room_for() -> None:
+    agents = ["--agent", "30,45", "--agent", "30.1,45", "--agent", "30,44.5"]
+    facts = json.loads(sightline("plan", "room3", "--base", "10,36", *agents, "--robot", "20,34", "--json").stdout)
+    schedule = schedule_of(facts)
+    assert schedule.radii_m[0] == 0.0
+    assert schedule.radii_m[1:4] == pytest.approx([0.05, 0.05, 0.2])
+    assert facts["motion"]["certified"]
