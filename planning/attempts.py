@@ -95,7 +95,7 @@ class Attempts:
     def come_near(self, level: Level) -> Schedule:
         """A motion that keeps a level of connection, and brings the team as near to its goals as was found."""
         task = self._task
-        if not task.movers or task.parts(task.starts, level) is not None:
+        if not task.movers or not task.keeps(task.starts, level):
             return self._stand()
         steps = self._crew
         return self._stage(steps, self._search(steps, level).places, level) or self._stand()
@@ -107,9 +107,9 @@ class Attempts:
             return None
         steps = self._crew
         there, back = steps.starts[None], steps.goals[None]
-        if task.parts(task.starts, level) is None:
+        if task.keeps(task.starts, level):
             there = self._search(steps, level).places
-        if task.parts(task.goals, level) is None:
+        if task.keeps(task.goals, level):
             back = steps.search(steps.goals, there[-1], level, self._effort).places[::-1]
         between = steps.search(there[-1], back[0], NOTHING, self._effort)
         if not between.complete:

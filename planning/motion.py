@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike
 from planning.attempts import EFFORT, Attempts
 from planning.environment import Environment
 from planning.geodesic import GeodesicMap
-from planning.motion_plan import Schedule
+from planning.motion_plan import InvalidSchedule, Schedule
 from planning.parting import find_parting, prove_parting
 from planning.team_task import NOTHING, Level, TeamTask, read_task
 
@@ -115,6 +115,8 @@ def plan_motion(
         of a robot at a place.
     """
     task = read_task(env, starts, goals, radius_m, members, speed_m_s, joined, unscheduled or {}, obstacles, geodesics)
+    for name in set(yielding) - set(task.members):
+        raise InvalidSchedule(f"'{name}' may step aside, but is no member: there are {', '.join(task.members)}")
     attempts = Attempts(task, placements, yielding, effort)
     proof, between = prove_parting(task)
     if not proof:

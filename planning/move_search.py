@@ -23,10 +23,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.environment import Environment
 from planning.kernel import kernel
 from planning.order_search import is_joined
-from planning.pair_sight import mark_sight
-from planning.team_roadmap import TeamRoadmap, watches
+from planning.team_roadmap import TeamRoadmap, see_throughout, watches
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -96,7 +96,7 @@ def search_moves(roadmap: TeamRoadmap, crew: Crew, goals: Ints, effort: int, gre
     environment = roadmap.environment
     states, best = _search(
         np.asarray(crew.at, dtype=np.int64), to_go, crew.radii_m, needed,
-        link_paths(crew, environment.walls, environment.tolerance_m), path_sees, path_watches, roadmap.places,
+        _link_paths(environment, crew.paths), path_sees, path_watches, roadmap.places,
         roadmap.visible, roadmap.edges, roadmap.starts, roadmap.at, roadmap.watched, environment.vertices,
         environment.tolerance_m, greed, effort,
     )  # fmt: skip
@@ -108,15 +108,10 @@ def search_moves(roadmap: TeamRoadmap, crew: Crew, goals: Ints, effort: int, gre
     return Moves(places, bool(np.array_equal(places[-1], goals)))
 
 
-def link_paths(crew: Crew, walls: Floats, tolerance: float) -> Bools:
+def _link_paths(environment: Environment, paths: Sequence[Floats]) -> Bools:
     """Which members on paths of their own see each other wherever they are: (p, p) bool."""
-    links = np.zeros((len(crew.paths), len(crew.paths)), dtype=np.bool_)
-    for i, one in enumerate(crew.paths):
-        for j, other in enumerate(crew.paths[:i]):
-            table = np.zeros((2 * len(one) - 1, 2 * len(other) - 1), dtype=np.uint8)
-            mark_sight(one, np.arange(len(one)), other, np.arange(len(other)), walls, tolerance, table, 1)
-            links[i, j] = links[j, i] = bool(table.all())
-    return links
+    links = [see_throughout(environment, one, other) for one in paths for other in paths]
+    return np.array(links, dtype=np.bool_).reshape(len(paths), len(paths))
 
 
 @kernel

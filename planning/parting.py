@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.certificate import Certificate, certify
+from planning.connectivity import component_labels
 from planning.motion_plan import Schedule
 from planning.team_task import TeamTask
 
@@ -58,14 +59,24 @@ def _certify_connection(task: TeamTask, schedule: Schedule) -> Certificate:
 
 
 def prove_parting(task: TeamTask) -> tuple[str, tuple[str, str] | None]:
-    """Why no motion can keep the task's level, and who parts; an empty sentence where nothing proves it."""
+    """Why no motion can keep the task's level, and who parts; an empty sentence where nothing proves it.
+
+    Of those who go as they please each corner of their ways is tried, with all others of them at their first places.
+    """
+    ways = list(task.unscheduled.values())
+    firsts = [way[0] for way in ways]
+    spots = [firsts, *([*firsts[:i], place, *firsts[i + 1 :]] for i, way in enumerate(ways) for place in way[1:])]
     for places, when in ((task.starts, "are not connected at the start"), (task.goals, "will not be at the goals")):
-        pair = task.parts(places, task.level)
-        if pair is not None:
-            one, other = (task.names[row] for row in pair)
-            spots = [*places, *(path[0] for path in task.unscheduled.values())]
-            text = f"{one} at {_name(spots[pair[0]])} and {other} at {_name(spots[pair[1]])} {when}"
-            return text, (one, other)
+        for others in spots:
+            everybody = np.array([*places, *others])
+            labels = component_labels(task.environment.visibility_matrix(everybody))
+            rows = task.level.rows
+            stray = [(i, j) for i in rows for j in rows if i < j and labels[i] != labels[j]]
+            if stray:
+                i, j = min(stray, key=lambda pair: float(np.hypot(*(everybody[pair[0]] - everybody[pair[1]]))))
+                one, other = task.names[i], task.names[j]
+                text = f"{one} at {_name(everybody[i])} and {other} at {_name(everybody[j])} {when}"
+                return text, (one, other)
     return "", None
 
 

@@ -22,7 +22,8 @@ from planning.pair_clearance import segment_distance
 from planning.pair_tables import APART, SEES, PairTables, make_tables
 from planning.path_elements import cut_path
 from planning.staging import choose_cuts, time_stages
-from planning.team_task import Level, TeamTask, see_throughout
+from planning.team_roadmap import see_throughout
+from planning.team_task import Level, TeamTask
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

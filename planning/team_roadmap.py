@@ -122,6 +122,15 @@ def extend_roadmap(roadmap: TeamRoadmap, free: Environment, places: Floats) -> T
     return extended
 
 
+def see_throughout(environment: Environment, path: Floats, other: Floats) -> bool:
+    """Whether every point of a path (m, 2), metres, sees every point of another (n, 2). O(m n w)."""
+    table = np.zeros((2 * len(path) - 1, 2 * len(other) - 1), dtype=np.uint8)
+    mark_sight(
+        path, np.arange(len(path)), other, np.arange(len(other)), environment.walls, environment.tolerance_m, table, 1
+    )
+    return bool(table.all())
+
+
 def find_mitres(environment: Environment, free: Environment, radius_m: float) -> Floats:
     """Places (n, 2), metres, at the map's reflex vertices from which a robot's ways lead along both walls.
 

@@ -14,8 +14,8 @@ from planning.connectivity import component_labels
 from planning.environment import Environment
 from planning.geodesic import GeodesicMap, NotInFreeSpace
 from planning.motion_plan import InvalidSchedule, Schedule
-from planning.pair_sight import mark_sight
 from planning.schedule import schedule
+from planning.team_roadmap import see_throughout
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -120,19 +120,10 @@ class TeamTask:
         """Of all, metres a second; those that go as they please at 1 m/s, for they wait for nobody."""
         return np.append(self.speeds_m_s, np.ones(len(self.unscheduled)))
 
-    def parts(self, places: Floats, level: Level) -> tuple[int, int] | None:
-        """Two rows of a level that no chain joins with the members at these places (k, 2); None if all are joined.
-
-        The two that are nearest to each other.
-        """
-        if not level.asks:
-            return None
+    def keeps(self, places: Floats, level: Level) -> bool:
+        """Whether a level holds with the members at these places (k, 2), wherever the others are on their paths."""
         labels = component_labels(self.network(places))
-        stray = [(i, j) for i in level.rows for j in level.rows if i < j and labels[i] != labels[j]]
-        if not stray:
-            return None
-        spots = np.array([*places, *(path[0] for path in self.unscheduled.values())])
-        return min(stray, key=lambda pair: float(np.hypot(*(spots[pair[0]] - spots[pair[1]]))))
+        return len({int(labels[row]) for row in level.rows}) <= 1
 
     def network(self, places: Floats) -> Bools:
         """Who sees whom with the members at these places (k, 2): (n, n) bool, n with those that go as they please."""
@@ -144,15 +135,6 @@ class TeamTask:
             for j in range(i):
                 links[i, j] = links[j, i] = see_throughout(self.environment, ways[i], ways[j])
         return links
-
-
-def see_throughout(environment: Environment, path: Floats, other: Floats) -> bool:
-    """Whether every point of a path (m, 2), metres, sees every point of another (n, 2). O(m n w)."""
-    table = np.zeros((2 * len(path) - 1, 2 * len(other) - 1), dtype=np.uint8)
-    mark_sight(
-        path, np.arange(len(path)), other, np.arange(len(other)), environment.walls, environment.tolerance_m, table, 1
-    )
-    return bool(table.all())
 
 
 def read_task(
@@ -180,6 +162,9 @@ def read_task(
         raise InvalidSchedule(
             f"{k} members have {len(begin)} starts and {len(end)} goals: give each one of both, finite, in metres"
         )
+    for name, path in others.items():
+        if len(path) == 0 or not np.isfinite(path).all():
+            raise InvalidSchedule(f"the way of {name} has no points, or one that is not finite: give metres")
     if len({*names, *others}) < k + len(others):
         raise InvalidSchedule("two members have one name: give each its own")
     for name in joined or ():
@@ -187,9 +172,7 @@ def read_task(
             raise InvalidSchedule(f"'{name}' is to be joined, but no member: there are {', '.join((*names, *others))}")
     everybody = [*names, *others]
     level = Level(tuple(i for i, name in enumerate(everybody) if joined is None or name in joined))
-    radii, speeds = (
-        np.array(np.broadcast_to(np.asarray(values, dtype=np.float64), k)) for values in (radius_m, speed_m_s)
-    )
+    radii, speeds = _spread(radius_m, k, "radius"), _spread(speed_m_s, k, "speed")
     movers = np.flatnonzero(np.any(begin != end, axis=1))
     if geodesics is None:
         widest = float(radii[movers].max(initial=0.0))
@@ -207,3 +190,13 @@ def read_task(
     return TeamTask(
         environment, geodesics, names, begin, end, radii, speeds, others, level, tuple(names[i] for i in lost), lengths
     )
+
+
+def _spread(given: ArrayLike, members: int, name: str) -> Floats:
+    values = np.array(given, dtype=np.float64)
+    if values.shape not in {(), (members,)} or not (np.isfinite(values) & (values >= 0.0)).all():
+        raise InvalidSchedule(
+            f"the {name} of {members} members is given as {values.tolist()}: give one finite number that is not "
+            "negative, or one for each member"
+        )
+    return np.array(np.broadcast_to(values, members))

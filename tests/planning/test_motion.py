@@ -174,7 +174,6 @@ def test_a_goal_that_cannot_be_reached_is_named() -> None:
     starts, goals = [(1, 1), (2, 3)], [(9, 1), (3, 3)]
     motion = plan_motion(room, starts, goals, RADIUS, members=["a", "b"])
     assert not motion.arrives and motion.proven and "no way for a to its goal" in motion.reason
-    check(motion, room, [(1, 1), (3, 3)]) if motion.arrives else None
     assert motion.schedule.paths[1].waypoints[-1].tolist() == [3.0, 3.0]
     with pytest.raises(NotInFreeSpace, match="a cannot set out"):
         plan_motion(room, [(0.1, 1), (2, 3)], goals, RADIUS, members=["a", "b"])
@@ -192,6 +191,17 @@ def test_an_agent_that_goes_as_it_pleases_is_seen_all_along() -> None:
     assert away.way == "parted" and away.proven
 
 
+def test_where_two_take_turns_to_see_an_agent_nothing_is_proven() -> None:
+    """Nobody sees all of its way, and yet it is always seen: only no motion can be planned by that."""
+    starts, goals, way = [(6, 1), (11, 6)], [(5.5, 1), (11, 6)], [(2, 2), (10, 2), (10, 10)]
+    motion = plan_motion(PILLAR, starts, goals, RADIUS, members=["a", "b"], unscheduled={"agent": way})
+    check(motion, PILLAR, goals)
+    assert motion.way == "parted" and motion.arrives and not motion.proven
+    farther = plan_motion(PILLAR, starts, goals, RADIUS, members=["a", "b"], unscheduled={"agent": [*way, (2, 10)]})
+    check(farther, PILLAR, goals)
+    assert farther.way == "parted" and farther.arrives and farther.proven and "agent at (2, 10)" in farther.reason
+
+
 def test_who_must_not_part_stays_connected_and_comes_near() -> None:
     names, radii = ["left", "right", "relay"], [0.0, 0.0, RADIUS]
     starts, goals = [(1, 6), (11, 6), (6, 1)], [(1, 6), (11, 6), (6, 11)]
@@ -205,6 +215,12 @@ def test_what_does_not_fit_is_refused() -> None:
         plan_motion(CORRIDOR, [(1, 0.5)], [(1, 0.5), (2, 0.5)], RADIUS, members=["a", "b"])
     with pytest.raises(InvalidSchedule, match="'c' is to be joined, but no member"):
         plan_motion(CORRIDOR, [(1, 0.5)], [(2, 0.5)], RADIUS, members=["a"], joined=["c"])
+    with pytest.raises(InvalidSchedule, match="'c' may step aside, but is no member"):
+        plan_motion(CORRIDOR, [(1, 0.5)], [(2, 0.5)], RADIUS, members=["a"], yielding=["c"])
+    with pytest.raises(InvalidSchedule, match="the radius of 1 members is given as nan"):
+        plan_motion(CORRIDOR, [(1, 0.5)], [(2, 0.5)], np.nan, members=["a"])
+    with pytest.raises(InvalidSchedule, match="the way of agent has no points"):
+        plan_motion(CORRIDOR, [(1, 0.5)], [(2, 0.5)], RADIUS, members=["a"], unscheduled={"agent": []})
     with pytest.raises(InvalidSchedule, match="one name"):
         plan_motion(CORRIDOR, [(1, 0.5), (3, 0.5)], [(2, 0.5), (4, 0.5)], RADIUS, members=["a", "a"])
 
