@@ -115,7 +115,7 @@ class BaseStation:
         """Begin the rhythms: control with state, heartbeat, planning."""
         epoch = max(0, round(1000.0 * now_s))
         starts = {robot.name: robot.start for robot in self._mission.robots}
-        self._dispatcher = Dispatcher(self._name, self._position, starts, epoch)
+        self._dispatcher = Dispatcher(self._name, self._position, starts, epoch, self._mission.robot_radius_m)
         self._authority = Authority(epoch=epoch, leader=self._name, sequence=0)
         self._grace_until_s = now_s + GRACE_S
         self._control = Rhythm(1.0 / self._mission.control_hz, now_s)

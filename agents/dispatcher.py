@@ -44,10 +44,14 @@ class Dispatcher:
         position: where it stands, metres, map frame.
         starts: where each robot of the roster is while nothing is heard of it.
         epoch: of the leader's authority.
+        robot_radius_m: of all robots.
     """
 
-    def __init__(self, base: str, position: Point, starts: Mapping[str, Point], epoch: int) -> None:
+    def __init__(
+        self, base: str, position: Point, starts: Mapping[str, Point], epoch: int, robot_radius_m: float
+    ) -> None:
         self._base, self._position, self._epoch = base, position, epoch
+        self._radius_m = robot_radius_m
         self._authority: MovementAuthority | None = None
         self._ended: MovementAuthority | None = None
         """The last one, as long as there is no other."""
@@ -104,7 +108,7 @@ class Dispatcher:
     @property
     def lost(self) -> dict[str, Floats]:
         """Where robots may be that are not heard, (m, 2) each, metres."""
-        return dict(self._lost)
+        return {name: way for name, way in self._lost.items() if len(way)}
 
     def said(self, authority: Authority, now_s: float) -> bool:
         """Note under which authority what is to be ordered has been; whether it was the first order of a revision."""
@@ -154,6 +158,7 @@ class Dispatcher:
             return self._authority.onset()
         if not self._all_stand():
             return None
+        self._settle_lost()
         places = {self._base: self._position} | {name: state.position for name, state in self._states.items()}
         self._asked = True
         return Onset(self._plan, 0, 0, places)
@@ -197,9 +202,28 @@ class Dispatcher:
         self._plan += self._asked  # what is being planned is out of date
         self._asked = False
 
+    def _settle_lost(self) -> None:
+        """Where others stand no lost robot does: then it is where it was heard last, or elsewhere."""
+        standing = np.array([state.position for state in self._states.values()]).reshape(-1, 2)
+        for name, way in self._lost.items():
+            for possible in (way, way[:1], way[:0]):
+                if _distance(possible, standing) > 2 * self._radius_m:
+                    break
+            self._lost[name] = possible
+
     def _all_stand(self) -> bool:
         held = self._held
         return held is not None and all(_stands(state, held) for state in self._states.values())
+
+
+def _distance(way: Floats, places: Floats) -> float:
+    """How near any of some places (n, 2) is to a way (m, 2), metres; inf where there is none."""
+    starts, ends = way[: max(len(way) - 1, 1)], way[1:] if len(way) > 1 else way
+    steps = ends - starts
+    squares = np.maximum((steps**2).sum(axis=1), np.finfo(float).tiny)
+    shares = np.clip(((places[:, None] - starts) * steps).sum(axis=2) / squares, 0.0, 1.0)
+    gaps = places[:, None] - starts - shares[..., None] * steps
+    return float(np.hypot(gaps[..., 0], gaps[..., 1]).min(initial=np.inf))
 
 
 def _moves(motion: Motion) -> bool:

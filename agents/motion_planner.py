@@ -19,7 +19,6 @@ could go at once, else that on which it holds longest.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, NamedTuple
@@ -136,13 +135,12 @@ class MotionPlanner:
 
         Complexity: that of a schedule, for each demand that cannot be met and the first that can.
         """
-        obstacles = {name: self._obstacle(way, onset) for name, way in lost.items()}
         prospect = Prospect(self._environment, way, self._mission.agent_speed_m_s)
         hoped_s = max(prospect.worth(self._at_once(onset, option, prospect.times_s)) for option in options)
         members = len(onset.places)  # those that go as they please come last
         candidates: list[Candidate] = []
         for laxity, option, joined in self._demands(onset, options):
-            found = self._find(onset, option, joined, way, list(obstacles.values()))
+            found = self._find(onset, option, joined, way, list(lost.values()))
             holds_s = prospect.worth(found.schedule.positions(prospect.times_s)[:, :members])
             worth_s = holds_s - LAXITY_S * laxity - STRANDED_S * (not found.arrives)
             candidates.append(Candidate(worth_s, laxity, option, found))
@@ -150,7 +148,7 @@ class MotionPlanner:
                 break
         best = max(candidates, key=lambda candidate: candidate.worth_s)
         less = best.laxity > 1 or not best.found.arrives
-        return self._certify(onset, best.option, best.found, obstacles, candidates[0].found.reason if less else "")
+        return self._certify(onset, best.option, best.found, lost, candidates[0].found.reason if less else "")
 
     def _find(
         self, onset: Onset, option: Option, joined: frozenset[str], way: Floats, obstacles: Sequence[Floats]
@@ -212,12 +210,6 @@ class MotionPlanner:
                 return Course(motion, option, found.arrives, reason)
         raise ValueError(f"the motion planned is not certified: {fault}")
 
-    def _obstacle(self, way: Floats, onset: Onset) -> Floats:
-        """Where a lost robot may be; if others stand there, only where it was heard last."""
-        robots = [place for name, place in onset.places.items() if name != self.base]
-        near = _distance(way, np.array(robots).reshape(-1, 2)) if robots else math.inf
-        return way if near > 2 * self._mission.robot_radius_m else way[:1]
-
 
 def _standing_somewhere(name: str, way: Floats, radius_m: float, stages: int) -> MemberWay:
     """A robot that stands anywhere on a way, in a motion of so many stages and one."""
@@ -250,13 +242,3 @@ def _begin(way: Floats, length_m: float) -> Floats:
     if passed_m[-1] <= length_m:
         return way
     return np.concatenate((way[passed_m < length_m], walk(way, np.array([length_m]))))
-
-
-def _distance(way: Floats, places: Floats) -> float:
-    """How near any of some places (n, 2) is to a way (m, 2), metres."""
-    starts, steps = way[:-1], np.diff(way, axis=0)
-    if len(steps) == 0:
-        starts, steps = way, np.zeros((1, 2))
-    squares = np.maximum((steps**2).sum(axis=1), np.finfo(float).tiny)
-    shares = np.clip(((places[:, None] - starts) * steps).sum(axis=2) / squares, 0.0, 1.0)
-    return float(np.hypot(*(places[:, None] - starts - shares[..., None] * steps).transpose(2, 0, 1)).min())
