@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from planning.certificate import certify
 from planning.environment import Environment
-from planning.geodesic import NotInFreeSpace
+from planning.geodesic import GeodesicMap, NotInFreeSpace
 from planning.motion import Motion, plan_motion
 from planning.motion_plan import InvalidSchedule
+from tests.planning.polygons import environment_of, free_points
 
 Floats = NDArray[np.float64]
 Deployment = tuple[tuple[int, int], ...]
@@ -302,3 +303,29 @@ def test_where_trying_everything_finds_a_connected_motion_so_do_we(seed: int) ->
         motion = plan_motion(room, starts, goals, 0.25, members=names, yielding=names)
         check(motion, room, goals)
         assert motion.arrives and motion.way != "parted", (start, goal, motion.reason)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_whatever_is_asked_the_certificate_agrees(seed: int) -> None:
+    """Random deployments on random maps, of whom some step aside, some stand, and one goes as it pleases."""
+    room = environment_of(seed)
+    rng = np.random.default_rng(seed)
+    free = room.inflated(0.15)
+    geodesics = GeodesicMap(free)
+    names = ["base", "a", "b", "c"]
+    for joined in (None, ["base", "a"], []):
+        starts, goals = free_points(free, 4, rng), free_points(free, 4, rng)
+        goals[[0, 3]] = starts[[0, 3]]
+        apart = [
+            np.hypot(*(places[:, None] - places).transpose(2, 0, 1))[np.triu_indices(4, 1)].min()
+            for places in (starts, goals)
+        ]
+        if min(apart) < 0.3:
+            continue
+        way = free_points(free, 1, rng)
+        motion = plan_motion(
+            room, starts, goals, [0.0, 0.15, 0.15, 0.15], members=names, joined=joined, yielding=["c"],
+            unscheduled={"agent": way} if seed % 2 else None, geodesics=geodesics, speed_m_s=[0.5, 1.0, 1.5, 2.0],
+        )  # fmt: skip
+        check(motion, room, goals)
+        assert motion.proven == motion.reason.startswith("not possible: ")
