@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import re
+from pathlib import Path
 
 import pytest
-from hypothesis import settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, rule
 
-from protocol import election_diagram
+from protocol import election, election_diagram
 from protocol.core import Heard, Note, Persist, Say, Tick, WakeAt, Written
 from protocol.election import (
     LARGEST_LEAP,
@@ -18,11 +19,12 @@ from protocol.election import (
     REST_AFTER_FAILURE_S,
     Effect,
     Election,
+    Event,
     Leads,
     LeadsNoMore,
 )
 from protocol.election_states import TRANSITIONS, Occurrence, Standing
-from protocol.messages import Authority, LastHeard, Reign, Vote, VoteRequest, Warrant
+from protocol.messages import Authority, Envelope, LastHeard, Reign, Vote, VoteRequest, Warrant, decode, encode
 from protocol.obedience import Obeys, ObeysNobody
 from protocol.promises import decode_promise
 from protocol.roster import Roster
@@ -280,11 +282,88 @@ def test_memory_is_bounded_whatever_arrives() -> None:
     assert ballot is None or len(ballot._asked_s) <= 10
 
 
+EPOCHS = st.one_of(st.integers(0, 4), st.integers(0, 2**53 - 1))
+NAMES = st.sampled_from(["base", "robot1", "robot2", "agent", "robot9"])
+NUMBERS = st.sampled_from([f"{incarnation}.{number}" for incarnation in (0, 1) for number in range(6)])
+REIGNS = st.builds(Reign, epoch=EPOCHS, leader=NAMES, incarnation=st.integers(0, 1))
+WARRANTS = st.builds(
+    Warrant,
+    lease_s=st.floats(0.0, 1e300),
+    marks=st.lists(st.builds(LastHeard, peer=NAMES, mark=NUMBERS), max_size=4).map(tuple),
+)
+ANYTHING = st.one_of(
+    st.just(Tick()),
+    st.builds(Written, st.integers(0, 4), st.sampled_from(["", "", "No space left on device"])),
+    st.builds(
+        Heard,
+        NAMES,
+        st.integers(0, 1),
+        st.one_of(
+            st.builds(
+                VoteRequest,
+                epoch=EPOCHS,
+                correlation=NUMBERS,
+                warrant=st.none() | WARRANTS,
+                canvass=st.booleans(),
+                withdrawn=st.booleans(),
+            ),
+            st.builds(
+                Vote,
+                candidate=NAMES,
+                correlation=NUMBERS,
+                granted=st.booleans(),
+                promise=st.none() | REIGNS,
+                mark=NUMBERS,
+            ),
+        ),
+    ),
+)
+
+
+@given(
+    NAMES.filter("robot9".__ne__), st.lists(st.tuples(st.sampled_from([0.0, 0.01, 0.3, 2.0]), ANYTHING), max_size=60)
+)
+def test_nothing_that_arrives_breaks_a_peer_or_its_rules(name: str, events: list[tuple[float, Event]]) -> None:
+    mind, now_s = peer(name), 0.0
+    bound: tuple[tuple[str, int], float] | None = None
+    """To whom it has promised its vote, and until when."""
+    for wait_s, event in events:
+        now_s += wait_s
+        effects = mind.handle(event, now_s)
+        assert isinstance(effects[-1], WakeAt)
+        for effect in effects:
+            if isinstance(effect, Say):
+                message = Envelope(sender=name, incarnation=0, sequence=0, sent_at_s=0.0, body=effect.body)
+                assert decode(encode(message)) == message
+        for vote in votes(effects):
+            if vote.granted and vote.promise is not None and not is_canvass(event):
+                holder = (vote.promise.leader, vote.promise.incarnation)
+                assert bound is None or holder == bound[0] or now_s >= bound[1]
+                bound = (holder, now_s + LEASE_S)
+        if isinstance(event, Heard) and isinstance(event.body, VoteRequest) and event.body.withdrawn:
+            bound = None
+
+
+def is_canvass(event: Event) -> bool:
+    return isinstance(event, Heard) and isinstance(event.body, VoteRequest) and event.body.canvass
+
+
 def led(team: Team) -> Peer:
     """The leader that a team has after a while."""
     team.run(2.0)
     (leader,) = team.leaders()
     return leader
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["core", "roster", "promises", "voter", "ballot", "obedience", "election_states", "election", "membership"],
+)
+def test_the_cores_know_no_clock_thread_file_or_socket(name: str) -> None:
+    source = (Path(election.__file__).parent / f"{name}.py").read_text(encoding="utf-8")
+    imported = {line.split()[1].partition(".")[0] for line in source.splitlines() if re.match("(import|from) ", line)}
+    assert "__future__" in imported
+    assert imported.isdisjoint({"time", "datetime", "os", "pathlib", "io", "threading", "asyncio", "socket", "zenoh"})
 
 
 def test_the_table_names_every_state_and_reaches_each() -> None:

@@ -22,7 +22,6 @@ from tests.protocol.election_mutants import (
 
 EXPLORED = {
     "two stand": TWO_STAND,
-    "any two of three stand, clocks agree": Bounds(steps=2, candidacies=2),
     "any two of three stand, a slow leader": Bounds(steps=2, candidacies=2, rates=(SLOW, FAST, FAST)),
     "a candidate hears of other epochs": replace(TWO_STAND, steps=3, refusals=True),
     "one dies without its disk": replace(ONE_DIES, lose_disks=True),
