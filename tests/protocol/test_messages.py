@@ -20,12 +20,17 @@ from protocol.messages import (
     GoalReply,
     Heartbeat,
     Intent,
+    LastHeard,
     MalformedMessage,
     MemberWay,
     Motion,
     Placement,
     Progress,
+    Reign,
     State,
+    Vote,
+    VoteRequest,
+    Warrant,
     decode,
     encode,
 )
@@ -61,6 +66,11 @@ motions = st.builds(
     connection=st.sampled_from(["team", "joined", "none"]),
     joined=st.lists(names, max_size=3).map(tuple),
 )
+warrants = st.builds(
+    Warrant,
+    lease_s=seconds,
+    marks=st.lists(st.builds(LastHeard, peer=names, mark=correlations), max_size=3).map(tuple),
+)
 bodies = st.one_of(
     st.builds(Heartbeat, role=st.sampled_from(["base_station", "robot", "tracked_agent"]), mode=modes),
     st.builds(
@@ -90,6 +100,22 @@ bodies = st.one_of(
         relays_needed=counts,
         reason=texts,
         motion=st.none() | motions,
+    ),
+    st.builds(
+        VoteRequest,
+        epoch=counts,
+        correlation=correlations,
+        warrant=st.none() | warrants,
+        canvass=st.booleans(),
+        withdrawn=st.booleans(),
+    ),
+    st.builds(
+        Vote,
+        candidate=names,
+        correlation=correlations,
+        granted=st.booleans(),
+        promise=st.none() | st.builds(Reign, epoch=counts, leader=names, incarnation=counts),
+        mark=correlations,
     ),
 )
 envelopes = st.builds(Envelope, sender=names, incarnation=counts, sequence=counts, sent_at_s=seconds, body=bodies)
