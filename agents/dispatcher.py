@@ -32,6 +32,9 @@ STILL_M_S: Final = 1e-6
 HORIZON_S: Final = 0.3
 """Stages are released that begin so long after the one that the slowest robot is in."""
 
+NEAR: Final = 1.1
+"""Ways of lost robots keep so many times from others what discs that touch do."""
+
 PATIENCE_S: Final = 2.0
 """A robot that is heard, and has not accepted a revision for so long, does not know the plan."""
 
@@ -133,11 +136,11 @@ class Dispatcher:
     def lose(self, robot: str) -> None:
         """Do without a robot of the roster."""
         state = self._states.pop(robot)
-        way = np.array([state.position])
+        way = [state.position]
         authority = self._authority or self._ended
         if authority is not None and robot in authority.robots and _plan(state) == (self._epoch, authority.motion.plan):
-            way = np.concatenate((way, np.array(authority.way(robot))))
-        self._lost[robot] = way
+            way += [place for place in authority.way(robot) if place != state.position]
+        self._lost[robot] = np.array(way)
         self._begin_afresh("")
 
     def release(self) -> None:
@@ -206,10 +209,8 @@ class Dispatcher:
         """Where others stand no lost robot does: then it is where it was heard last, or elsewhere."""
         standing = np.array([state.position for state in self._states.values()]).reshape(-1, 2)
         for name, way in self._lost.items():
-            for possible in (way, way[:1], way[:0]):
-                if _distance(possible, standing) > 2 * self._radius_m:
-                    break
-            self._lost[name] = possible
+            if _distance(way, standing) < NEAR * 2 * self._radius_m:
+                self._lost[name] = way[:1] if _distance(way[:1], standing) > 2 * self._radius_m else way[:0]
 
     def _all_stand(self) -> bool:
         held = self._held

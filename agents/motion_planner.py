@@ -50,6 +50,9 @@ FORESIGHT_S: Final = 1.0
 STAGE_S: Final = 0.25
 """Stages are cut to this duration, so that those released reach no farther than they must."""
 
+GROWTH: Final = 0.15
+"""So much longer may stages be for each second that they are ahead."""
+
 SLOWER_S: Final = 0.3
 """A motion is good enough if the chain holds that much shorter on it than if all could go at once."""
 
@@ -59,12 +62,12 @@ LAXITY_S: Final = 0.3
 STRANDED_S: Final = 2.0
 """Likewise a motion that does not arrive."""
 
+CLEARANCE_M: Final = 0.02
+"""From where a lost robot may be: ways around it are not quite round."""
+
 EFFORT: Final = 300
 LAST_EFFORT: Final = 2000
 """Of searches for a motion that keeps sight, and for one that need not."""
-
-GROWTH: Final = 0.15
-"""So much longer may stages be for each second that they are ahead."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +143,7 @@ class MotionPlanner:
         members = len(onset.places)  # those that go as they please come last
         candidates: list[Candidate] = []
         for laxity, option, joined in self._demands(onset, options):
-            found = self._find(onset, option, joined, way, list(lost.values()))
+            found = self._find(onset, option, joined, way, lost)
             holds_s = prospect.worth(found.schedule.positions(prospect.times_s)[:, :members])
             worth_s = holds_s - LAXITY_S * laxity - STRANDED_S * (not found.arrives)
             candidates.append(Candidate(worth_s, laxity, option, found))
@@ -151,21 +154,27 @@ class MotionPlanner:
         return self._certify(onset, best.option, best.found, lost, candidates[0].found.reason if less else "")
 
     def _find(
-        self, onset: Onset, option: Option, joined: frozenset[str], way: Floats, obstacles: Sequence[Floats]
+        self, onset: Onset, option: Option, joined: frozenset[str], way: Floats, lost: Mapping[str, Floats]
     ) -> TeamMotion:
         """The motion to an option's goals in which these members stay in one network."""
-        mission, members = self._mission, [self.base, *option.goals]
+        mission = self._mission
+        # Of a lost robot that has one place it is known exactly how near others may come.
+        standing = {name: _point(where[0]) for name, where in lost.items() if len(where) == 1}
+        starts = {self.base: onset.places[self.base], **{name: onset.places[name] for name in option.goals}, **standing}
+        goals = {**starts, **option.goals}
         ahead = _begin(way, FORESIGHT_S * mission.agent_speed_m_s)
         return plan_motion(
             self._environment,
-            [onset.places[name] for name in members],
-            [onset.places[self.base], *option.goals.values()],
-            [0.0, *[mission.robot_radius_m] * len(option.goals)],
-            members=members,
+            list(starts.values()),
+            list(goals.values()),
+            [0.0 if name == self.base else mission.robot_radius_m for name in starts],
+            members=list(starts),
             speed_m_s=mission.robot_speed_m_s,
             joined=joined,
             unscheduled={self._agent: ahead} if self._agent in joined else None,
-            obstacles=[(where, mission.robot_radius_m) for where in obstacles],
+            obstacles=[
+                (where, mission.robot_radius_m + CLEARANCE_M) for name, where in lost.items() if name not in standing
+            ],
             geodesics=self.geodesics,
             placements=self._placements,
             may_part=False,
@@ -201,7 +210,8 @@ class MotionPlanner:
         )
         stages = len(new.ways[0].stages)
         standing = (_standing_somewhere(name, way, self._mission.robot_radius_m, stages) for name, way in lost.items())
-        motion = onset.continued(structs.replace(new, ways=(*new.ways, *standing)))
+        planned = (way for way in new.ways if way.member not in lost)
+        motion = onset.continued(structs.replace(new, ways=(*planned, *standing)))
         joined = frozenset(found.connection)
         for demand in dict.fromkeys((joined, joined - {self._agent}, joined & _joined(onset.kept), frozenset[str]())):
             motion = _demand(motion, demand)
@@ -242,3 +252,7 @@ def _begin(way: Floats, length_m: float) -> Floats:
     if passed_m[-1] <= length_m:
         return way
     return np.concatenate((way[passed_m < length_m], walk(way, np.array([length_m]))))
+
+
+def _point(place: Floats) -> Point:
+    return float(place[0]), float(place[1])

@@ -1,0 +1,157 @@
+"""The team in motion, in virtual time: discs stay apart and everybody is one network, whoever is lost or late.
+
+Bodies are looked at fifty times a second, between what they record too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from itertools import combinations
+
+import numpy as np
+import pytest
+from msgspec import structs
+
+import maps
+from agents.casting import Casting
+from agents.mission import Mission, Wandering
+from agents.records import AnyRecord, LogLine, Ordered
+from launcher.mission_trace import MissionTrace
+from launcher.report import Metrics, measure
+from launcher.simulation import SimulatedPeer, simulate
+from planning.environment import Environment
+from protocol.simulated_bus import SimulatedNetwork, VirtualTime
+from tests.launcher.test_simulation import team
+
+STARTS = [(1.0, 10.0), (1.5, 10.0), (2.0, 10.0), (2.5, 10.0)]
+
+
+@cache
+def office() -> Environment:
+    return Environment.load(maps.path("office"))
+
+
+def mission(seed: int) -> Mission:
+    walk = Wandering(start_after_s=1.0, around_corner_share=1.0)
+    wandering = team(walk, (1.5, 11.0), (4.5, 10.5), STARTS, seed)
+    return structs.replace(wandering, robot_speed_m_s=1.4, agent_speed_m_s=0.9)
+
+
+class Stage:
+    """A simulation in which the test may do harm."""
+
+    def __init__(self, seed: int, loss: float = 0.0) -> None:
+        self.mission = mission(seed)
+        self.time = VirtualTime()
+        self.network = SimulatedNetwork(self.time, seed, loss=loss)
+        self.records: list[tuple[float, str, AnyRecord]] = []
+        self.casting = Casting(self.mission, office())
+        self.peers = {entry.name: self.cast(entry.name) for entry in self.mission.roster}
+        self.nearest_m = np.inf
+
+    def cast(self, name: str) -> SimulatedPeer:
+        return SimulatedPeer(
+            self.time, self.network, self.casting, self.mission, name,
+            lambda time_s, peer, record: self.records.append((time_s, peer, record)),
+        )  # fmt: skip
+
+    def run(self, until_s: float) -> None:
+        robots = [entry.name for entry in self.mission.robots]
+        while self.time.now_s < until_s:
+            self.time.run_until(min(self.time.now_s + 0.02, until_s))
+            places = []
+            for name in robots:
+                self.peers[name]._driver.advance(self.time.now_s)
+                places.append(self.peers[name]._driver.pose())
+            gaps = [np.hypot(*np.subtract(one, other)) for one, other in combinations(places, 2)]
+            self.nearest_m = min(self.nearest_m, *gaps)
+
+    def measure(self) -> Metrics:
+        return measure(MissionTrace.of(self.records, self.mission, self.time.now_s), office())
+
+    def warnings(self) -> list[str]:
+        return [record.text for _, _, record in self.records if isinstance(record, LogLine) and record.level != "info"]
+
+
+def test_nobody_touches_anybody_and_the_network_is_certified() -> None:
+    stage = Stage(3)
+    for peer in stage.peers.values():
+        peer.start()
+    stage.run(15.0)
+    assert stage.nearest_m > 0.4 - 1e-6
+    metrics = stage.measure()
+    assert not metrics.failures
+    assert (metrics.plans, metrics.errors) == (1, 0)
+    assert metrics.motions > 10
+    assert metrics.total_distance_m > 10.0
+    assert metrics.certified is not None
+    assert metrics.certified.team > 0.95
+    assert metrics.certified.agent <= metrics.certified.team <= metrics.certified.chain
+    assert metrics.since_first_deployment is not None
+    assert metrics.since_first_deployment.chain_connected > 0.97
+
+
+def cut_off(stage: Stage, name: str) -> None:
+    """Nobody hears it any more, nor it anybody; it goes on as it was told."""
+    stage.peers[name]._shell._bus.close()
+
+
+def crash(stage: Stage, name: str) -> None:
+    """The mind is gone, and the body stands when its last command has run out."""
+    cut_off(stage, name)
+    stage.peers[name]._due_s = np.nan
+
+
+@pytest.mark.parametrize("harm", [cut_off, crash])
+def test_a_robot_that_is_lost_is_in_nobodys_way_and_taken_in_again(harm: Callable[[Stage, str], None]) -> None:
+    stage = Stage(4)
+    for peer in stage.peers.values():
+        peer.start()
+    stage.run(6.0)
+    harm(stage, "robot2")
+    stage.run(13.0)
+    lost = stage.peers["robot2"]
+    place = lost._driver.pose()
+    stage.mission = structs.replace(
+        stage.mission,
+        roster=tuple(
+            structs.replace(entry, start=place) if entry.name == "robot2" else entry for entry in stage.mission.roster
+        ),
+    )
+    stage.casting = Casting(stage.mission, office())
+    stage.peers["robot2"] = again = stage.cast("robot2")
+    lost._due_s = np.nan  # from now on the new process drives the body
+    again.start()
+    again._shell._incarnation = 1
+    stage.run(17.0)
+    assert stage.nearest_m > 0.4 - 1e-6
+    orders = [(time_s, record.motion) for time_s, _, record in stage.records if isinstance(record, Ordered)]
+    plans = {motion.plan: {way.member for way in motion.ways if way.scheduled} for _, motion in orders}
+    assert [("robot2" in members) for members in plans.values()] == [True, False, True]
+    assert any(way.member == "robot2" and not way.scheduled for _, motion in orders for way in motion.ways)
+    metrics = stage.measure()
+    assert metrics.errors == 0
+    assert not metrics.failures
+
+
+@pytest.mark.parametrize("loss", [0.1, 0.3])
+def test_messages_may_be_lost(loss: float) -> None:
+    """Who has not heard of a release or of another's progress waits for the next time that it is said."""
+    stage = Stage(5, loss)
+    for peer in stage.peers.values():
+        peer.start()
+    stage.run(12.0)
+    assert stage.nearest_m > 0.4 - 1e-6
+    metrics = stage.measure()
+    assert metrics.errors == 0
+    assert metrics.total_distance_m > 4.0
+    assert metrics.since_first_deployment is not None
+    assert metrics.since_first_deployment.chain_connected > 0.9
+
+
+def test_a_trace_knows_its_motions() -> None:
+    trace = simulate(mission(6), office(), duration_s=4.0)
+    assert trace.motions
+    times_s = [time_s for time_s, _ in trace.motions]
+    assert times_s == sorted(times_s)
