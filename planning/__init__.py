@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from planning.geodesic import GeodesicMap
     from planning.hybrid_schedule import adjacency_schedule, hybrid_schedule
     from planning.motion import Motion, plan_motion
-    from planning.motion_plan import Schedule, TimedPath
+    from planning.motion_plan import InvalidSchedule, Schedule, TimedPath
     from planning.mutual_visibility import mutual_visibility
     from planning.no_schedule import NoSchedule
     from planning.physical_weights import (
@@ -56,6 +56,7 @@ __all__ = [
     "DeploymentSequence",
     "Environment",
     "GeodesicMap",
+    "InvalidSchedule",
     "MostRelays",
     "Motion",
     "NoSchedule",
@@ -106,6 +107,7 @@ _HOMES = {
     "DeploymentSequence": "planning.deployment_sequence",
     "Environment": "planning.environment",
     "GeodesicMap": "planning.geodesic",
+    "InvalidSchedule": "planning.motion_plan",
     "MostRelays": "planning.relays",
     "Motion": "planning.motion",
     "NoSchedule": "planning.no_schedule",

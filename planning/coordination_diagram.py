@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from planning.coordination import collision_boxes
+from planning.motion_plan import read_points
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -91,7 +92,7 @@ class CoordinationDiagram:
 
         Complexity: O(k² m²) for the boxes, and the size of the tables.
         """
-        points = tuple(np.array(path, dtype=np.float64).reshape(-1, 2) for path in paths)
+        points = tuple(read_points(path) for path in paths)
         radii = np.asarray(radii_m, dtype=np.float64)
         cuts = [np.asarray(at, dtype=np.float64) for at in cuts_m or [()] * len(points)]
         cut = [_insert(path, at) for path, at in zip(points, cuts, strict=True)]

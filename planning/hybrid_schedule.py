@@ -27,7 +27,7 @@ from planning.coordination_diagram import CoordinationDiagram, Pair, measure_pat
 from planning.decomposition import Cells
 from planning.diagram_schedule import Team, schedule_in
 from planning.grid_schedule import MOST_NODES, choose_demand
-from planning.motion_plan import Schedule
+from planning.motion_plan import Schedule, read_points
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -73,7 +73,7 @@ def hybrid_schedule(
 
     Complexity: O(k m C) for C corners of cells to cut the paths; the search is exponential in k.
     """
-    points = [np.array(path, dtype=np.float64).reshape(-1, 2) for path in paths]
+    points = [read_points(path) for path in paths]
     radii, speeds = (np.array(np.broadcast_to(value, len(points)), dtype=float) for value in (radius_m, speed_m_s))
     required, together = choose_demand(len(points), True, links, joined)
     pairs = list(combinations(range(len(points)), 2)) if together else sorted(required)

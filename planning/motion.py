@@ -52,7 +52,8 @@ class Motion:
         geodesic_m: of the shortest ways of those who can get to their goals.
         connection: members that are in one network throughout, over any others, whoever is late: ask for these as
             ``ends`` of a certificate. Fewer than two: for nothing.
-        proven: of a motion that is parted or does not arrive: whether no motion could do better.
+        proven: of a motion that is parted or does not arrive: whether it is certain that none arrives and keeps the
+            connection.
     """
 
     schedule: Schedule
@@ -90,7 +91,8 @@ def plan_motion(
         env: the map as drawn.
         starts: (k, 2) float, metres, map frame.
         goals: (k, 2) float, metres; who starts at its goal stands.
-        radius_m: of the discs, one or (k,), metres; 0 for a member without a body, as a base station may be.
+        radius_m: of the discs, one or (k,), metres; 0 for a member without a body, as a base station may be. All who
+            move keep as clear of walls as the widest of them has to.
         members: k names.
         speed_m_s: the greatest speeds, one or (k,), finite and positive.
         joined: members that have to be in one network of sight throughout, over any others; None for all, those that
@@ -127,13 +129,17 @@ def plan_motion(
         if motion.arrives or proof:
             return motion
     schedule = attempts.come_near(task.level)
-    return _report(task, schedule, "stepwise", task.level, f"not all arrive: {attempts.reason}", attempts.between)
+    kept = task.level if task.keeps(task.starts, task.level) else NOTHING
+    return _report(
+        task, schedule, "stepwise", kept, f"not all arrive: {proof or attempts.reason}", between or attempts.between,
+        proven=bool(proof),
+    )  # fmt: skip
 
 
 def _part(task: TeamTask, attempts: Attempts, proof: str, between: tuple[str, str] | None) -> Motion:
     """The motion with the briefest break."""
     tried = [(schedule, find_parting(task, schedule)) for schedule in _partings(attempts, task)]
-    schedule, parting = min(tried, key=lambda found: found[1].break_s)
+    schedule, parting = min(tried, key=lambda found: (found[1].break_s, -found[1].since_s))
     reason = f"not possible: {proof}" if proof else f"no connected motion was found: {parting.text}"
     return _report(
         task, schedule, "parted", NOTHING, reason, between or parting.between, parting.break_s, proven=bool(proof)
@@ -176,5 +182,5 @@ def _report(
         float(sum(path.length_m for path in schedule.paths[:k])),
         float(task.geodesic_lengths_m.sum()),
         tuple(task.names[row] for row in level.rows),
-        proven or bool(task.unreachable),
+        proven or (bool(task.unreachable) and task.alike),
     )

@@ -28,6 +28,23 @@ class InvalidSchedule(ValueError):
     """Paths, times or limits that are no schedule; the text is one sentence that names the member and the place."""
 
 
+def read_points(given: ArrayLike) -> Floats:
+    """Points (m, 2) float, metres, of an array of pairs; a single pair is one point.
+
+    Raises:
+        InvalidSchedule: they are no pairs of numbers.
+    """
+    try:
+        points = np.array(given, dtype=np.float64, order="C")
+    except (TypeError, ValueError) as problem:
+        raise InvalidSchedule(f"points are no numbers ({problem}): give pairs x, y in metres") from None
+    if points.size == 0:
+        return np.zeros((0, 2))
+    if points.ndim not in (1, 2) or points.shape[-1] != 2:
+        raise InvalidSchedule(f"points of shape {points.shape}: give pairs x, y in metres")
+    return points.reshape(-1, 2)
+
+
 @dataclass(frozen=True, init=False, eq=False)
 class TimedPath:
     """Straight and evenly from each waypoint to the next; still before the first and after the last.
@@ -44,7 +61,7 @@ class TimedPath:
     times_s: Floats
 
     def __init__(self, waypoints: ArrayLike, times_s: ArrayLike) -> None:
-        points = np.array(waypoints, dtype=np.float64, order="C").reshape(-1, 2)
+        points = read_points(waypoints)
         times = np.array(times_s, dtype=np.float64).reshape(-1)
         if len(points) != len(times) or len(points) == 0:
             raise InvalidSchedule(

@@ -24,11 +24,13 @@ class Parting:
     """What a schedule breaks of the connection that is asked for if it is executed at full speed.
 
     Attributes:
+        since_s: when it begins, seconds; inf if nobody parts.
         break_s: for how long, seconds; inf if it ends so.
         between: two members that part first; None if nobody parts.
         text: who parts, where and when; a sentence.
     """
 
+    since_s: float
     break_s: float
     between: tuple[str, str] | None
     text: str
@@ -41,7 +43,7 @@ def find_parting(task: TeamTask, schedule: Schedule) -> Parting:
         (violation.time_s, violation.until_s) for violation in judged.violations if violation.kind == "connection"
     ]
     if not breaks:
-        return Parting(0.0, None, "nobody parts at full speed, but somebody may if others are late")
+        return Parting(np.inf, 0.0, None, "nobody parts at full speed, but somebody may if others are late")
     first = next(violation for violation in judged.violations if violation.kind == "connection")
     one, other = first.members
     row = schedule.members.index(one)
@@ -49,7 +51,10 @@ def find_parting(task: TeamTask, schedule: Schedule) -> Parting:
     lasts = sum(until - since for since, until in breaks)
     how_long = f"for {lasts:.3g} s" if np.isfinite(lasts) else "for good"
     return Parting(
-        lasts, (one, other), f"{one} and {other} part at ({x:.4g}, {y:.4g}) after {first.time_s:.3g} s, {how_long}"
+        first.time_s,
+        lasts,
+        (one, other),
+        f"{one} and {other} part at ({x:.4g}, {y:.4g}) after {first.time_s:.3g} s, {how_long}",
     )
 
 

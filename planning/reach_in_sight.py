@@ -26,6 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from planning.kernel import kernel
 from planning.line_of_sight import free_points_see, point_is_free
+from planning.motion_plan import read_points
 from planning.visible_interval import sees_throughout
 
 if TYPE_CHECKING:
@@ -65,7 +66,7 @@ def time_in_sight(
         raise ValueError(f"a target's greatest speed is {speed_m_s} m/s: give a number above 0")
     if not 0.0 <= radius_m < np.inf:
         raise ValueError(f"a target is within {radius_m} m of its place: give a number of at least 0")
-    way, places = (np.array(points, dtype=np.float64).reshape(-1, 2) for points in (watcher, target))
+    way, places = (read_points(points) for points in (watcher, target))
     if min(len(way), len(places)) == 0 or not (np.isfinite(way).all() and np.isfinite(places).all()):
         raise ValueError("a watcher or a target is nowhere, or at a place that is not finite: give metres")
     pieces = np.stack([way[:-1], way[1:]], axis=1) if len(way) > 1 else np.stack([way, way], axis=1)

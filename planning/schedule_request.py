@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from planning.environment import Environment
-from planning.motion_plan import InvalidSchedule
+from planning.motion_plan import InvalidSchedule, read_points
 from planning.step_rules import Demand
 
 Floats = NDArray[np.float64]
@@ -108,7 +108,7 @@ def read_request(
 
 
 def _read_path(path: ArrayLike, name: str) -> Floats:
-    points = np.array(path, dtype=np.float64, order="C").reshape(-1, 2)
+    points = read_points(path)
     if len(points) == 0:
         raise InvalidSchedule(f"the path of {name} has no points: give at least the place where it stands")
     if not np.isfinite(points).all():

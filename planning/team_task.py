@@ -13,7 +13,7 @@ from planning.carving import carve
 from planning.connectivity import component_labels
 from planning.environment import Environment
 from planning.geodesic import GeodesicMap, NotInFreeSpace
-from planning.motion_plan import InvalidSchedule, Schedule
+from planning.motion_plan import InvalidSchedule, Schedule, read_points
 from planning.schedule import schedule
 from planning.team_roadmap import see_throughout
 
@@ -78,6 +78,11 @@ class TeamTask:
     def movers(self) -> list[int]:
         """Rows of those that do not start at their goals."""
         return [int(i) for i in np.flatnonzero(np.any(self.starts != self.goals, axis=1))]
+
+    @property
+    def alike(self) -> bool:
+        """Whether all discs have one radius, so that what the widest cannot reach is out of reach for each."""
+        return len(set(self.radii_m[self.radii_m > 0.0])) <= 1
 
     @cached_property
     def standing(self) -> list[int]:
@@ -156,8 +161,8 @@ def read_task(
         NotInFreeSpace: somebody is to set out from where it cannot be.
     """
     names, k = tuple(members), len(members)
-    others = {name: np.array(path, dtype=np.float64, order="C").reshape(-1, 2) for name, path in unscheduled.items()}
-    begin, end = (np.array(places, dtype=np.float64, order="C").reshape(-1, 2) for places in (starts, goals))
+    others = {name: read_points(path) for name, path in unscheduled.items()}
+    begin, end = read_points(starts), read_points(goals)
     if not (len(begin) == len(end) == k > 0) or not (np.isfinite(begin).all() and np.isfinite(end).all()):
         raise InvalidSchedule(
             f"{k} members have {len(begin)} starts and {len(end)} goals: give each one of both, finite, in metres"

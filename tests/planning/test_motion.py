@@ -329,3 +329,35 @@ def test_whatever_is_asked_the_certificate_agrees(seed: int) -> None:
         )  # fmt: skip
         check(motion, room, goals)
         assert motion.proven == motion.reason.startswith("not possible: ")
+
+
+def two_rooms() -> Environment:
+    return Environment([(0, 0), (20, 0), (20, 10), (0, 10)], [[(9, 2), (11, 2), (11, 8), (9, 8)]])
+
+
+@pytest.mark.parametrize(
+    ("starts", "goals", "claimed"),
+    [([(8, 5), (12, 5)], [(8, 9), (12, 9)], ()), ([(8, 9), (12, 9)], [(8, 5), (12, 5)], ("a", "b"))],
+)
+def test_who_may_not_part_and_cannot_but_part_is_told_so(
+    starts: list[tuple[float, float]], goals: list[tuple[float, float]], claimed: tuple[str, ...]
+) -> None:
+    motion = plan_motion(two_rooms(), starts, goals, 0.3, members=["a", "b"], may_part=False)
+    assert not motion.arrives
+    assert motion.proven
+    assert motion.between == ("a", "b")
+    assert "not connected at the start" in motion.reason or "will not be at the goals" in motion.reason
+    assert motion.connection == claimed
+    assert certify(motion.schedule, two_rooms(), links=[], ends=motion.connection or None).valid
+
+
+def test_what_the_widest_cannot_reach_is_not_proven_for_the_others() -> None:
+    square = Environment([(0, 0), (10, 0), (10, 10), (0, 10)])
+    starts, goals = [(1, 1), (3, 1)], [(0.2, 5), (7, 5)]
+    assert not plan_motion(square, starts, goals, [0.1, 0.5], members=["a", "b"]).proven
+    assert plan_motion(square, starts, goals, 0.5, members=["a", "b"]).proven
+
+
+def test_points_of_three_numbers_are_refused() -> None:
+    with pytest.raises(InvalidSchedule, match="give pairs"):
+        plan_motion(two_rooms(), [(1, 1, 2), (2, 3, 4)], [(1, 1, 2), (2, 3, 4)], 0.3, members=["a", "b", "c"])
