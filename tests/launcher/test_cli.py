@@ -12,6 +12,7 @@ from typer.testing import CliRunner, Result
 
 import maps
 from launcher.cli import app
+from launcher.contacts import Overlap
 from planning.environment import Environment
 
 SQUARE = {"type": "Polygon", "coordinates": [[[-5, -5], [5, -5], [5, 5], [-5, 5], [-5, -5]]]}
@@ -192,6 +193,19 @@ def test_simulate_prints_figures_and_json_the_same_twice(scenario: Path, tmp_pat
     assert table.exit_code == 0, table.output
     assert "times faster than real time" in table.stdout
     assert recording.stat().st_size > 0
+
+
+@pytest.mark.parametrize("options", [[], ["--json"]])
+def test_robots_that_overlap_are_a_failure(scenario: Path, options: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    collision = Overlap(peers=("robot1", "robot2"), episodes=2, seconds=0.4)
+    monkeypatch.setattr("launcher.report.find_overlaps", lambda *_: iter([collision]))
+    result = sightline("simulate", str(scenario), "--duration", "2", *options)
+    assert result.exit_code == 1
+    assert "sightline: failed with seed 3: robot1 and robot2 overlapped 2 times, 0.4 s in all" in result.stderr
+    if options:
+        assert json.loads(result.stdout)["missions"][0]["failures"] == [
+            "robot1 and robot2 overlapped 2 times, 0.4 s in all"
+        ]
 
 
 def test_simulate_refuses_what_cannot_be_run(scenario: Path) -> None:

@@ -11,12 +11,12 @@ import pytest
 from rich.console import Console
 
 from agents.mission import Mission
-from agents.records import AnyRecord, Decision, LogLine, Planned, Track
+from agents.records import AnyRecord, Decision, LogLine, Ordered, Planned, Track
 from launcher.mission_trace import MissionTrace
-from launcher.report import Metrics, measure
+from launcher.report import CertifiedShares, Metrics, measure
 from launcher.report_table import render
 from planning.environment import Environment
-from protocol.messages import Authority, Deployment, Placement, Point
+from protocol.messages import Authority, Deployment, MemberWay, Motion, Placement, Point
 from tests.agents.conftest import make_mission
 
 CORNER = Environment([(0, 0), (10, 0), (10, 5), (5, 5), (5, 10), (0, 10)])
@@ -51,6 +51,12 @@ def decide(time_s: float, number: int, relays: tuple[str, ...], changed: bool = 
 def judge(records: Records, duration_s: float = 10.0) -> Metrics:
     mission: Mission = make_mission()
     return measure(MissionTrace.of(records, mission, duration_s), CORNER)
+
+
+def shown(metrics: Metrics) -> str:
+    paper = StringIO()
+    Console(width=160, file=paper).print(render(metrics))
+    return paper.getvalue()
 
 
 def test_everybody_at_home_is_connected_all_the_time() -> None:
@@ -134,6 +140,53 @@ def test_overlaps_are_counted_in_episodes_and_seconds() -> None:
     assert overlap.seconds == pytest.approx(inside_s, abs=0.2)
 
 
+def test_overlaps_of_robots_are_failures_and_those_with_the_agent_are_not() -> None:
+    records = [*tracks("base", (1.0, 1.0)), *tracks("robot1", (3.0, 1.0)), *tracks("robot2", (3.0, 1.3))]
+    metrics = judge([*records, *tracks("agent", (3.0, 1.0))])
+    assert [contact.peers for contact in metrics.overlaps] == [("robot1", "robot2")]
+    assert metrics.failures == ("robot1 and robot2 overlapped 1 times, 10.0 s in all",)
+    assert {frozenset(contact.peers) for contact in metrics.agent_contacts} == {
+        frozenset(("agent", "robot1")),
+        frozenset(("agent", "robot2")),
+    }
+    assert "overlapping robots" in shown(metrics)
+
+
+def test_who_may_have_gone_around_is_not_accused() -> None:
+    # A robot that turns right between two records passes the other at 0.4 m, and the straight between them at 0.38 m:
+    # at 1 m/s it may have been 0.045 m beside that straight. One that was on the straight all the time did overlap.
+    for speed_share, expected in ((1.0, 1), (0.5, 0)):
+
+        def drive(time_s: float, share: float = speed_share) -> Point:
+            return (2.0 + share * time_s, 1.38)
+
+        records = [*tracks("base", (1.0, 1.0)), *tracks("agent", (9.0, 1.0)), *tracks("robot1", (5.0, 1.0))]
+        records += tracks("robot2", drive)
+        assert len(judge(records).overlaps) == expected
+
+
+def test_certificates_count_for_as_long_as_their_motions() -> None:
+    def order(time_s: float, number: int, connection: str, *members: str) -> tuple[float, str, AnyRecord]:
+        ways = tuple(
+            MemberWay(member=name, radius_m=0.2, speed_m_s=1.0, waypoints=((1.0, 1.0),), stages=(0, 0))
+            for name in ("base", "robot1", *members)
+        )
+        motion = Motion(
+            plan=number // 2, revision=number % 2, first_stage=0, released=-1, ways=ways,
+            connection=connection, joined=("base", "robot1"),  # type: ignore[arg-type]
+        )  # fmt: skip
+        return time_s, "base", Ordered(motion=motion)
+
+    records = [entry for peer in ("base", "agent", "robot1", "robot2") for entry in tracks(peer, (1.0, 1.0))]
+    records += [order(2.0, 0, "team", "agent"), order(4.0, 1, "team"), order(7.0, 2, "joined"), order(9.0, 3, "none")]
+    records += [(1.0 * n, "base", Planned(planning_s=0.1, in_sight_s=0.2 * n)) for n in range(4)]
+    metrics = judge(records)
+    assert (metrics.plans, metrics.motions) == (2, 4)
+    assert metrics.certified == CertifiedShares(seconds=8.0, agent=0.25, team=0.625, chain=0.875)
+    assert metrics.agent_certain == 0.25  # plans are due every half second
+    assert "2 plans, 2 revisions; certified as one network 62.5 % of" in shown(metrics)
+
+
 def test_distance_is_that_of_the_path_and_restarts_are_no_journeys() -> None:
     records = [*tracks("base", (1.0, 1.0)), *tracks("agent", (1.0, 1.0)), *tracks("robot2", (1.0, 1.0))]
     records += tracks("robot1", lambda time_s: (1.0 + abs(time_s - 2.0), 1.0), 0.0, 4.0)
@@ -178,8 +231,5 @@ def test_figures_survive_json_and_can_be_shown() -> None:
     records += [decide(1.0, 1, ()), decide(2.0, 2, ("robot1",), changed=True)]
     for metrics in (judge(records), judge([])):
         assert msgspec.json.decode(msgspec.json.encode(metrics), type=Metrics) == metrics
-        paper = StringIO()
-        Console(width=120, file=paper).print(render(metrics))
-        shown = paper.getvalue()
-        assert "agent-base chain connected" in shown
-        assert f"{100 * metrics.whole_run.chain_connected:.1f} %" in shown
+        assert "agent-base chain connected" in shown(metrics)
+        assert f"{100 * metrics.whole_run.chain_connected:.1f} %" in shown(metrics)
