@@ -424,10 +424,11 @@ class Exploration:
             reigns += move.reigns
         places = (*places[:voter], move.local, *places[voter + 1 :])  # type: ignore[assignment]
         heard = said | move.said
-        for candidate in range(3):  # forget votes that do not change their candidate, and will not
-            votes = heard & self._votes[candidate]
-            if votes and (candidate == voter or votes & move.said):
-                heard &= ~votes | self._hear(step, places[candidate], votes).effective
+        for candidate, for_it in enumerate(
+            self._votes
+        ):  # forget votes that do not change their candidate, and will not
+            if heard & for_it and (candidate == voter or move.said & for_it):
+                heard &= ~for_it | self._hear(step, places[candidate], heard & for_it).effective
         return move.text, (step, places, heard, crashes, candidacies + move.stands, reigns), fault
 
     def _crashes(self, world: World, voter: int) -> Iterator[tuple[str, World, str]]:
