@@ -31,7 +31,7 @@ class PeerStatus:
     """As in the messages; ``starting`` before the first, ``lost`` when a peer that spoke is not up."""
     position: Point | None
     obeying: bool
-    """It follows a deployment."""
+    """It has accepted the motion to a deployment."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,8 +121,8 @@ class TeamView:
         match envelope.body:
             case Heartbeat(mode=mode):
                 known.mode = mode
-            case State(position=position, mode=mode, obeying=obeying):
-                known.position, known.mode, known.obeying = position, mode, obeying is not None
+            case State(position=position, mode=mode, progress=progress):
+                known.position, known.mode, known.obeying = position, mode, progress is not None
             case Intent(position=position, mode=mode, goal=goal):
                 known.position, known.mode, self.goal = position, mode, goal
             case Deployment() as deployment:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from agents.base_station import silence_s
 from launcher.contacts import Overlap, find_overlaps
 from launcher.mission_trace import MissionTrace, Trail
+from launcher.wording import counted
 from planning.environment import Environment
 
 Floats = NDArray[np.float64]
@@ -160,7 +161,8 @@ def measure(trace: MissionTrace, environment: Environment) -> Metrics:
         overlaps=overlaps,
         agent_contacts=tuple(contact for contact in contacts if contact not in overlaps),
         failures=tuple(
-            f"{' and '.join(overlap.peers)} overlapped {overlap.episodes} times, {overlap.seconds:.1f} s in all"
+            f"{' and '.join(overlap.peers)} overlapped {counted(overlap.episodes, 'time')}, "
+            f"{overlap.seconds:.1f} s in all"
             for overlap in overlaps
         ),
         warnings=sum(line.level == "warning" for _, _, line in trace.logs),

@@ -7,6 +7,7 @@ from rich.table import Table
 
 from launcher.contacts import Overlap
 from launcher.report import Metrics, Shares
+from launcher.wording import counted
 
 
 def render(metrics: Metrics) -> Group:
@@ -65,7 +66,7 @@ def _describe_motion(metrics: Metrics) -> str:
     if metrics.certified is None:
         return "none"
     certified = metrics.certified
-    plans = f"{metrics.plans} plan{'s' * (metrics.plans != 1)}, {metrics.motions - metrics.plans} revisions"
+    plans = f"{counted(metrics.plans, 'plan')}, {counted(metrics.motions - metrics.plans, 'revision')}"
     return (
         f"{plans}; certified as one network {100 * certified.team:.1f} % of the time, with the agent's next moments "
         f"{100 * certified.agent:.1f} %"
@@ -76,7 +77,8 @@ def _describe_contacts(contacts: tuple[Overlap, ...]) -> str:
     if not contacts:
         return "never"
     seconds = sum(contact.seconds for contact in contacts)
-    return f"{sum(contact.episodes for contact in contacts)} times, {seconds:.1f} s in all, {len(contacts)} pairs"
+    times = counted(sum(contact.episodes for contact in contacts), "time")
+    return f"{times}, {seconds:.1f} s in all, {counted(len(contacts), 'pair')}"
 
 
 def _metres(length_m: float | None) -> str:

@@ -144,7 +144,7 @@ def test_overlaps_of_robots_are_failures_and_those_with_the_agent_are_not() -> N
     records = [*tracks("base", (1.0, 1.0)), *tracks("robot1", (3.0, 1.0)), *tracks("robot2", (3.0, 1.3))]
     metrics = judge([*records, *tracks("agent", (3.0, 1.0))])
     assert [contact.peers for contact in metrics.overlaps] == [("robot1", "robot2")]
-    assert metrics.failures == ("robot1 and robot2 overlapped 1 times, 10.0 s in all",)
+    assert metrics.failures == ("robot1 and robot2 overlapped 1 time, 10.0 s in all",)
     assert {frozenset(contact.peers) for contact in metrics.agent_contacts} == {
         frozenset(("agent", "robot1")),
         frozenset(("agent", "robot2")),
