@@ -12,6 +12,7 @@ from protocol.messages import Point
 _COLOURS = {
     "moving": "cyan",
     "arrived": "green",
+    "yielding": "blue",
     "holding": "yellow",
     "lost": "red",
     "starting": "dim",
