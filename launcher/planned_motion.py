@@ -147,8 +147,14 @@ class PlannedMotion:
 
     @property
     def succeeds(self) -> bool:
-        """Whether all get there, and the network holds."""
-        return self.motion.arrives and self.motion.way != "parted"
+        """Whether all get there, and the certificate finds nothing wrong on the way."""
+        return self.motion.arrives and self.certificate.valid
+
+    @property
+    def fault(self) -> str:
+        """One sentence on a motion that does not succeed."""
+        planned_so = self.motion.way == "parted" or not self.motion.arrives
+        return self.motion.reason if planned_so else self.certificate.violations[0].text
 
     @property
     def moves(self) -> list[Move]:

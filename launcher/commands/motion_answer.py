@@ -28,7 +28,7 @@ WAYS = {
     "detour": "with detours",
     "stepwise": "step by step",
     "bridge": "over a deployment in between",
-    "parted": "the network parts",
+    "parted": "best effort",
 }
 
 

@@ -77,7 +77,7 @@ def answer_plan(request: Request, as_json: bool) -> None:
             tell_motion(planned)
         tell_end(request, facts)
     if planned is not None and not planned.succeeds:
-        raise ScenarioFault(f"{file}: {planned.motion.reason}")
+        raise ScenarioFault(f"{file}: {planned.fault}")
 
 
 def _find(

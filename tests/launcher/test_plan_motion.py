@@ -81,7 +81,7 @@ def test_a_team_that_has_to_part_is_told_and_ends_with_2(monkeypatch: pytest.Mon
     assert result.stderr.startswith("sightline: ")
     assert result.stderr.count("\n") == 1
     assert " part at " in result.stderr
-    assert "Motion: the network parts" in result.stdout
+    assert "Motion: best effort" in result.stdout
     assert "  broken    for " in result.stdout
     assert (tmp_path / "best.svg").exists(), "the best effort"
     facts = json.loads(sightline(*ROW, "--json").stdout)["motion"]

@@ -34,7 +34,7 @@ def answer(*arguments: str) -> dict[str, Any]:
     assert result.exit_code in (0, 2), (result.output, result.exception)
     facts: dict[str, Any] = json.loads(result.stdout)
     motion = facts.get("motion")
-    assert result.exit_code == 2 * (motion is not None and (motion["way"] == "parted" or not motion["arrives"]))
+    assert result.exit_code == 2 * (motion is not None and not (motion["certified"] and motion["arrives"]))
     return facts
 
 
