@@ -36,6 +36,7 @@ def check(motion: Motion, room: Environment, goals: object = None) -> None:
     if goals is not None:
         assert motion.arrives == np.array_equal(ends[: len(np.array(goals))], np.array(goals, dtype=np.float64))
     assert motion.break_s == 0.0 or motion.way == "parted"
+    assert motion.way != "parted" or motion.proven or not certify(motion.schedule, room).valid
     assert motion.length_m >= motion.geodesic_m - 1e-6 or not motion.arrives
     assert bool(motion.reason) == (motion.way != "direct" or not motion.arrives)
 
