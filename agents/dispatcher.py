@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from agents.motion_message import end_stage
 from agents.movement_authority import MovementAuthority, Onset
 from agents.records import Advance
+from planning.foresight import distance
 from protocol.messages import Authority, Motion, Point, Progress, State
 
 if TYPE_CHECKING:
@@ -209,22 +210,12 @@ class Dispatcher:
         """Where others stand no lost robot does: then it is where it was heard last, or elsewhere."""
         standing = np.array([state.position for state in self._states.values()]).reshape(-1, 2)
         for name, way in self._lost.items():
-            if _distance(way, standing) < NEAR * 2 * self._radius_m:
-                self._lost[name] = way[:1] if _distance(way[:1], standing) > 2 * self._radius_m else way[:0]
+            if distance(way, standing) < NEAR * 2 * self._radius_m:
+                self._lost[name] = way[:1] if distance(way[:1], standing) > 2 * self._radius_m else way[:0]
 
     def _all_stand(self) -> bool:
         held = self._held
         return held is not None and all(_stands(state, held) for state in self._states.values())
-
-
-def _distance(way: Floats, places: Floats) -> float:
-    """How near any of some places (n, 2) is to a way (m, 2), metres; inf where there is none."""
-    starts, ends = way[: max(len(way) - 1, 1)], way[1:] if len(way) > 1 else way
-    steps = ends - starts
-    squares = np.maximum((steps**2).sum(axis=1), np.finfo(float).tiny)
-    shares = np.clip(((places[:, None] - starts) * steps).sum(axis=2) / squares, 0.0, 1.0)
-    gaps = places[:, None] - starts - shares[..., None] * steps
-    return float(np.hypot(gaps[..., 0], gaps[..., 1]).min(initial=np.inf))
 
 
 def _moves(motion: Motion) -> bool:

@@ -31,7 +31,7 @@ from agents.mission import Mission
 from agents.motion_message import to_motion
 from agents.movement_authority import Onset
 from agents.outlook import Prospect
-from planning.foresight import walk
+from planning.foresight import distance, head, walk
 from planning.motion import Motion as TeamMotion
 from planning.motion import plan_motion
 from planning.short_stages import shorten
@@ -47,10 +47,10 @@ Floats = NDArray[np.float64]
 FORESIGHT_S: Final = 1.0
 """So much of the agent's way is to stay in sight throughout."""
 
-STAGE_S: Final = 0.25
+STAGE_S: Final = 0.4
 """Stages are cut to this duration, so that those released reach no farther than they must."""
 
-GROWTH: Final = 0.15
+GROWTH: Final = 0.2
 """So much longer may stages be for each second that they are ahead."""
 
 SLOWER_S: Final = 0.3
@@ -139,7 +139,14 @@ class MotionPlanner:
         Complexity: that of a schedule, for each demand that cannot be met and the first that can.
         """
         prospect = Prospect(self._environment, way, self._mission.agent_speed_m_s)
-        hoped_s = max(prospect.worth(self._at_once(onset, option, prospect.times_s)) for option in options)
+        ways = [self._geodesics_of(onset, option) for option in options]
+        driven_m = prospect.times_s * self._mission.robot_speed_m_s
+        hoped_s = max(
+            prospect.worth(np.stack([walk(own, driven_m) for own in among.values()], axis=1)) for among in ways
+        )
+        # Leading robots around one that stands in the way takes long, to find and to drive.
+        clear = sorted(range(len(options)), key=lambda index: self._count_blocked(ways[index]))
+        options = [options[index] for index in clear]
         members = len(onset.places)  # those that go as they please come last
         candidates: list[Candidate] = []
         for laxity, option, joined in self._demands(onset, options):
@@ -162,7 +169,7 @@ class MotionPlanner:
         standing = {name: _point(where[0]) for name, where in lost.items() if len(where) == 1}
         starts = {self.base: onset.places[self.base], **{name: onset.places[name] for name in option.goals}, **standing}
         goals = {**starts, **option.goals}
-        ahead = _begin(way, FORESIGHT_S * mission.agent_speed_m_s)
+        ahead = head(way, FORESIGHT_S * mission.agent_speed_m_s)
         return plan_motion(
             self._environment,
             list(starts.values()),
@@ -191,15 +198,20 @@ class MotionPlanner:
                 if laxity != 2 or 1 < len(chain) < len(team):
                     yield laxity, option, joined
 
-    def _at_once(self, onset: Onset, option: Option, times_s: Floats) -> Floats:
-        """Where everybody would be after so many seconds (t,) if nobody had to wait: (t, k, 2) float, metres."""
-        ways = [
-            np.array([onset.places[name]])
+    def _geodesics_of(self, onset: Onset, option: Option) -> dict[str, Floats]:
+        """Everybody's shortest way (m, 2), metres; of one point for those that stand."""
+        return {
+            name: np.array([place])
             if option.goals.get(name, place) == place
             else self.geodesics.path(place, option.goals[name])
             for name, place in onset.places.items()
-        ]
-        return np.stack([walk(way, times_s * self._mission.robot_speed_m_s) for way in ways], axis=1)
+        }
+
+    def _count_blocked(self, ways: Mapping[str, Floats]) -> int:
+        """How many ways lead over a robot that stands."""
+        standing = np.array([way[0] for name, way in ways.items() if len(way) == 1 and name != self.base])
+        touching_m = 2 * self._mission.robot_radius_m
+        return sum(distance(way, standing.reshape(-1, 2)) < touching_m for way in ways.values() if len(way) > 1)
 
     def _certify(
         self, onset: Onset, option: Option, found: TeamMotion, lost: Mapping[str, Floats], reason: str
@@ -244,14 +256,6 @@ def _joined(motion: Motion | None) -> frozenset[str]:
     if motion is None:
         return frozenset()
     return frozenset(way.member for way in motion.ways) if motion.connection == "team" else frozenset(motion.joined)
-
-
-def _begin(way: Floats, length_m: float) -> Floats:
-    """The first metres of a way (m, 2)."""
-    passed_m = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(way, axis=0).T))))
-    if passed_m[-1] <= length_m:
-        return way
-    return np.concatenate((way[passed_m < length_m], walk(way, np.array([length_m]))))
 
 
 def _point(place: Floats) -> Point:

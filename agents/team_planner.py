@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from agents.assignment import assign
 from agents.motion_planner import Option
 from agents.planning_job import Answer, Question
-from planning.foresight import length, walk
+from planning.foresight import tail
 from planning.reach_in_sight import time_in_sight
 from protocol.messages import Point
 
@@ -53,7 +53,7 @@ class TeamPlanner:
     def plan(self, question: Question) -> Answer:
         """Who is to stand where, for the agent as it will be when the robots can begin to go there, and how."""
         onset = question.onset
-        way = _without(np.array(question.way, dtype=np.float64), question.lead_s * self._agent_speed_m_s)
+        way = tail(question.way, question.lead_s * self._agent_speed_m_s)
         robots = {name: place for name, place in onset.places.items() if name != self._motions.base}
         obstacles = [place for lost in question.lost.values() for place in _points(lost)]
         plan = self._deployments.plan(_point(way[0]), _points(way), robots, question.previous, obstacles)
@@ -101,13 +101,6 @@ def _option(plan: Plan, before: Plan | None, robots: Collection[str]) -> Option:
 def _last_relay(plan: Plan) -> str | None:
     relays = [placement.robot for placement in plan.placements if not placement.spare]
     return relays[-1] if relays else None
-
-
-def _without(way: Floats, length_m: float) -> Floats:
-    """What is left of a way (m, 2) after its first metres, at least its end."""
-    passed_m = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(way, axis=0).T))))
-    length_m = min(length_m, length(way))
-    return np.concatenate((walk(way, np.array([length_m])), way[passed_m > length_m]))
 
 
 def _points(places: Floats) -> list[Point]:

@@ -22,9 +22,37 @@ def length(way: ArrayLike) -> float:
 def walk(way: ArrayLike, lengths_m: Floats) -> Floats:
     """Where one is on a polyline (m, 2) after each of these lengths (t,), at its end when it is over: (t, 2) float."""
     points = np.asarray(way, dtype=np.float64).reshape(-1, 2)
-    passed = np.zeros(len(points))
-    np.cumsum(np.hypot(*np.diff(points, axis=0).T), out=passed[1:])
+    passed = _passed(points)
     return np.column_stack((np.interp(lengths_m, passed, points[:, 0]), np.interp(lengths_m, passed, points[:, 1])))
+
+
+def head(way: ArrayLike, length_m: float) -> Floats:
+    """The first metres of a polyline (m, 2), or all of it: (n, 2) float."""
+    points = np.asarray(way, dtype=np.float64).reshape(-1, 2)
+    return np.concatenate((points[_passed(points) < length_m], walk(points, np.array([length_m]))))
+
+
+def tail(way: ArrayLike, length_m: float) -> Floats:
+    """What is left of a polyline (m, 2) after its first metres, at least its end: (n, 2) float."""
+    points = np.asarray(way, dtype=np.float64).reshape(-1, 2)
+    return np.concatenate((walk(points, np.array([length_m])), points[_passed(points) > length_m]))
+
+
+def distance(way: ArrayLike, places: ArrayLike) -> float:
+    """How near the nearest of some places (n, 2) is to a polyline (m, 2), metres; inf where there is none. O(m n)."""
+    points = np.asarray(way, dtype=np.float64).reshape(-1, 2)
+    others = np.asarray(places, dtype=np.float64).reshape(-1, 1, 2)
+    starts = points[: max(len(points) - 1, 1)]
+    steps = points[1:] - starts if len(points) > 1 else np.zeros((1, 2))
+    squares = np.maximum((steps**2).sum(axis=1), np.finfo(float).tiny)
+    shares = np.clip(((others - starts) * steps).sum(axis=2) / squares, 0.0, 1.0)
+    gaps = others - starts - shares[..., None] * steps
+    return float(np.hypot(gaps[..., 0], gaps[..., 1]).min(initial=np.inf))
+
+
+def _passed(points: Floats) -> Floats:
+    """How far each point of a polyline (m, 2) is from its beginning: (m,) float, metres."""
+    return np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
 
 
 def chain_holds(environment: Environment, tracks: Floats) -> Bools:

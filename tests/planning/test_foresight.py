@@ -9,7 +9,7 @@ import shapely
 
 import maps
 from planning.environment import Environment
-from planning.foresight import chain_holds, length, walk
+from planning.foresight import chain_holds, distance, head, length, tail, walk
 
 
 @pytest.mark.parametrize("name", ["office", "room1"])
@@ -40,3 +40,19 @@ def test_walking_is_interpolation_along_the_line() -> None:
 def test_a_way_of_one_point_is_a_place() -> None:
     np.testing.assert_array_equal(walk([(2.0, 1.0)], np.array([0.0, 3.0])), [(2.0, 1.0), (2.0, 1.0)])
     assert length([(2.0, 1.0)]) == 0.0
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_parts_and_distances_are_those_of_shapely(seed: int) -> None:
+    chance = np.random.default_rng(seed)
+    way, places = chance.uniform(0.0, 10.0, (5, 2)), chance.uniform(0.0, 10.0, (7, 2))
+    line = shapely.LineString(way)
+    for cut in (0.0, 0.3 * line.length, line.length, 2.0 * line.length):
+        first, rest = head(way, cut), tail(way, cut)
+        assert length(first) == pytest.approx(min(cut, line.length))
+        assert length(first) + length(rest) == pytest.approx(line.length)
+        assert first[-1] == pytest.approx(rest[0])
+        assert (first[0], rest[-1]) == (pytest.approx(way[0]), pytest.approx(way[-1]))
+    assert distance(way, places) == pytest.approx(line.distance(shapely.MultiPoint(places)))
+    assert distance(way[:1], places) == pytest.approx(shapely.Point(way[0]).distance(shapely.MultiPoint(places)))
+    assert distance(way, []) == np.inf
