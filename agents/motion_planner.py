@@ -144,9 +144,9 @@ class MotionPlanner:
         hoped_s = max(
             prospect.worth(np.stack([walk(own, driven_m) for own in among.values()], axis=1)) for among in ways
         )
-        # Leading robots around one that stands in the way takes long, to find and to drive.
-        clear = sorted(range(len(options)), key=lambda index: self._count_blocked(ways[index]))
-        options = [options[index] for index in clear]
+        # Ways around those that are in the way take long to find, and to drive.
+        conflicts = [self._count_conflicts(among) for among in ways]
+        options = [options[index] for index in sorted(range(len(options)), key=lambda index: conflicts[index])]
         members = len(onset.places)  # those that go as they please come last
         candidates: list[Candidate] = []
         for laxity, option, joined in self._demands(onset, options):
@@ -207,11 +207,15 @@ class MotionPlanner:
             for name, place in onset.places.items()
         }
 
-    def _count_blocked(self, ways: Mapping[str, Floats]) -> int:
-        """How many ways lead over a robot that stands."""
-        standing = np.array([way[0] for name, way in ways.items() if len(way) == 1 and name != self.base])
+    def _count_conflicts(self, ways: Mapping[str, Floats]) -> int:
+        """How many would have to pass one that stands, overtake one that moves, or pass one that comes towards them."""
+        own = [way for name, way in ways.items() if name != self.base]
         touching_m = 2 * self._mission.robot_radius_m
-        return sum(distance(way, standing.reshape(-1, 2)) < touching_m for way in ways.values() if len(way) > 1)
+        starts, goals = (
+            np.array([[distance(way, other[end]) < touching_m for other in own] for way in own]) for end in (0, -1)
+        )
+        conflicts = (starts & goals) | (starts & starts.T) | (goals & goals.T)
+        return int(np.count_nonzero(conflicts)) - len(own)
 
     def _certify(
         self, onset: Onset, option: Option, found: TeamMotion, lost: Mapping[str, Floats], reason: str

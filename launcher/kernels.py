@@ -37,7 +37,7 @@ def warm_up(announce: Callable[[str], None] = lambda _: None, packages: Sequence
     """
     stale = {package: modules for package in packages or PACKAGES if (modules := _stale_modules(package))}
     if stale:
-        announce("Compiling the numerical kernels (once for this version; a minute or two) ...")
+        announce("Compiling the numerical kernels (once for this version; some minutes) ...")
     for package, modules in stale.items():
         _compile(package, modules)
     return bool(stale)

@@ -220,7 +220,9 @@ def _after(start_s: float, edges_s: Floats) -> Floats:
 
 def _shares(judged: Bools, lengths_s: Floats) -> Shares:
     seconds = float(lengths_s.sum())
-    visible, chain, team = (judged.T @ lengths_s / seconds).tolist() if seconds > 0.0 else (0.0, 0.0, 0.0)
+    # Rounding of the sums must not make a share of more than all.
+    shares = np.minimum(judged.T @ lengths_s / seconds, 1.0) if seconds > 0.0 else np.zeros(3)
+    visible, chain, team = shares.tolist()
     return Shares(seconds=seconds, agent_visible=visible, chain_connected=chain, team_connected=team)
 
 

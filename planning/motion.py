@@ -124,7 +124,8 @@ def plan_motion(
     proof, between = prove_parting(task)
     if not proof:
         for schedule, way in attempts.arrive(task.level):
-            return _report(task, schedule, way, task.level, attempts.reason, attempts.between)
+            reason = f"not by shortest ways alone: {attempts.reason}" if attempts.reason else ""
+            return _report(task, schedule, way, task.level, reason, attempts.between)
     if may_part and task.level.asks:
         motion = _part(task, attempts, proof, between)
         if motion.arrives or proof:

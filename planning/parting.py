@@ -46,7 +46,7 @@ def find_parting(task: TeamTask, schedule: Schedule) -> Parting:
         return Parting(np.inf, 0.0, None, "nobody parts at full speed, but somebody may if others are late")
     first = next(violation for violation in judged.violations if violation.kind == "connection")
     one, other = first.members
-    row = schedule.members.index(one)
+    row = max((schedule.members.index(name) for name in (one, other)), key=lambda i: schedule.paths[i].length_m)
     x, y = schedule.paths[row].positions([first.time_s])[0]
     lasts = sum(until - since for since, until in breaks)
     how_long = f"for {lasts:.3g} s" if np.isfinite(lasts) else "for good"
