@@ -18,23 +18,14 @@ from msgspec import structs
 from agents.dispatcher import Dispatcher
 from agents.mission import Mission
 from agents.network import judge_network
+from agents.orders import changes_topology, first_orders, is_decision, renew
 from agents.planning_job import Answer, Question
 from agents.records import Advance, Decision, LogLine, Ordered, Planned, Track
 from agents.rhythm import EARLY_S, Rhythm
-from agents.role import (
-    Compute,
-    Effect,
-    Event,
-    Heard,
-    JobDone,
-    Publish,
-    Record,
-    WakeAt,
-    Woken,
-)
+from agents.role import Compute, Effect, Event, Heard, JobDone, Publish, Record, WakeAt, Woken
 from planning.environment import Environment
 from protocol.bus import PeerAppeared, PeerVanished
-from protocol.messages import AnyBody, Authority, Deployment, Heartbeat, Intent, Mode, Placement, Point, State
+from protocol.messages import AnyBody, Authority, Heartbeat, Intent, Mode, Point, State
 
 if TYPE_CHECKING:
     from agents.leader import Plan
@@ -101,7 +92,7 @@ class BaseStation:
         self._known: dict[str, Known] = {}
         self._sequence = 0
         self._plan: Plan | None = None
-        self._orders: Deployment | None = None
+        self._orders = first_orders(mission)
         """What was said last."""
         self._said_s = -math.inf
         self._advance: Advance | None = None
@@ -229,28 +220,17 @@ class BaseStation:
 
     def _decide(self, plan: Plan, planning_s: float) -> None:
         """Take a deployment over, and say so soon unless it is the same as before."""
-        before, orders = self._plan, self._orders
+        before = self._plan
         self._plan = plan
         if plan.serves != (before is None or before.serves):
             self._log("info" if plan.serves else "warning", plan.reason)
-        decides = before is None or _choice(plan) != _choice(before)
+        decides = is_decision(plan, before)
         if before is not None and not decides and plan.placements == before.placements:
             return
-        self._orders = Deployment(
-            authority=self._authority,
-            valid_for_s=self._mission.valid_for_s,
-            decision=(0 if orders is None else orders.decision) + decides,
-            placements=plan.placements,
-            edges=plan.edges,
-            cost=_finite(plan.cost) or 0.0,
-            total_cost_m=_finite(plan.total_cost_m),
-            lower_bound_m=_finite(plan.lower_bound_m),
-            relays_needed=plan.relays_needed,
-            reason=plan.reason[:500] if decides or orders is None else orders.reason,
-        )
+        self._orders = renew(self._orders, plan, decides=decides)
         self._say_at_s = -math.inf
         if decides:
-            changed = before is not None and set(map(frozenset, plan.edges)) != set(map(frozenset, before.edges))
+            changed = changes_topology(plan, before)
             self._effects.append(
                 Record(Decision(deployment=self._orders, planning_s=planning_s, topology_changed=changed))
             )
@@ -259,11 +239,10 @@ class BaseStation:
         """Order what stands, under the next authority."""
         dispatcher = self._dispatcher
         self._authority = structs.replace(self._authority, sequence=self._authority.sequence + 1)
-        self._orders = structs.replace(
-            self._orders or _first_orders(self._mission), authority=self._authority, motion=dispatcher.motion
-        )
-        if dispatcher.said(self._authority, now_s) and self._orders.motion is not None:
-            self._effects.append(Record(Ordered(motion=self._orders.motion)))
+        motion = dispatcher.motion
+        self._orders = structs.replace(self._orders, authority=self._authority, motion=motion)
+        if dispatcher.said(self._authority, now_s) and motion is not None:
+            self._effects.append(Record(Ordered(motion=motion)))
         if (advance := dispatcher.advance) != self._advance and advance is not None:
             self._effects.append(Record(advance))
         self._advance = advance
@@ -282,7 +261,6 @@ class BaseStation:
         for name in (self._agent, *self._robots):
             if name in self._known:
                 places[name] = self._known[name].body.position
-        edges = () if self._orders is None else self._orders.edges
         complete = len(places) == 2 + len(self._robots)
         self._effects += (
             Publish(
@@ -297,7 +275,7 @@ class BaseStation:
                     radius_m=self._mission.robot_radius_m, mode=self._mode,
                 )
             ),
-            Record(judge_network(self._environment, self._name, self._agent, places, edges, complete)),
+            Record(judge_network(self._environment, self._name, self._agent, places, self._orders.edges, complete)),
         )  # fmt: skip
 
     def _complain(self, level: Literal["warning", "error"], what: str, why: str) -> None:
@@ -308,23 +286,3 @@ class BaseStation:
 
     def _log(self, level: Literal["info", "warning", "error"], text: str) -> None:
         self._effects.append(Record(LogLine(level=level, text=text)))
-
-
-def _first_orders(mission: Mission) -> Deployment:
-    """What is said before there is a plan: to hold."""
-    return Deployment(
-        authority=Authority(epoch=0, leader=mission.base_station.name, sequence=0),
-        valid_for_s=mission.valid_for_s, decision=0, placements=(), edges=(), cost=0.0, relays_needed=0,
-        reason="everybody holds before the first plan",
-    )  # fmt: skip
-
-
-def _finite(number: float | None) -> float | None:
-    """The number, or None: JSON has no infinity."""
-    return number if number is not None and math.isfinite(number) else None
-
-
-def _choice(plan: Plan) -> tuple[object, ...]:
-    """What makes a decision: links, and places of relays. Places of spares do not."""
-    relays: tuple[Placement, ...] = tuple(placement for placement in plan.placements if not placement.spare)
-    return plan.edges, relays

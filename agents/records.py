@@ -32,7 +32,7 @@ class Decision(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", ta
     planning_s: float
     """Time that the planning job took (modelled in simulation)."""
     topology_changed: bool
-    """Whether the tree's edges differ from those of the decision before."""
+    """Whether the tree's edges differ from those of the decision before, and not only by who stands where."""
 
 
 def in_words(deployment: Deployment) -> str:

@@ -26,7 +26,7 @@ Floats = NDArray[np.float64]
 
 LOOKED_AHEAD_S: Final = 60.0
 
-EXCHANGED: Final = "; robots exchange places, so that none has to overtake"
+EXCHANGED: Final = "; places exchanged, so that none has to overtake"
 """Added to the reason of a plan."""
 
 

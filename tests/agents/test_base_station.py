@@ -234,6 +234,17 @@ def test_a_relay_that_moves_is_a_decision_and_a_new_link_changes_the_topology(te
     assert [decision.deployment.decision for decision in team.decisions] == [1, 2, 3]
 
 
+def test_robots_that_exchange_places_leave_the_topology_as_it_is(team: Team) -> None:
+    team.go_on(1.0)
+    exchanged = tuple(
+        structs.replace(place, robot={"robot1": "robot2", "robot2": "robot1"}[place.robot])
+        for place in plan().placements
+    )
+    team.oracle.answer = replace(plan(edges=(("base", "robot2"), ("robot2", "agent"))), placements=exchanged)
+    team.go_on(1.0)
+    assert [decision.topology_changed for decision in team.decisions] == [False, False]
+
+
 def test_plans_at_once_when_the_agent_has_a_new_goal(team: Team) -> None:
     team.go_on(5.2)
     before = len(team.oracle.asked)
