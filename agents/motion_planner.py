@@ -28,6 +28,7 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from agents.mission import Mission
+from agents.motion_level import joined_members
 from agents.motion_message import to_motion
 from agents.movement_authority import Onset
 from agents.outlook import Prospect
@@ -229,7 +230,8 @@ class MotionPlanner:
         planned = (way for way in new.ways if way.member not in lost)
         motion = onset.continued(structs.replace(new, ways=(*planned, *standing)))
         joined = frozenset(found.connection)
-        for demand in dict.fromkeys((joined, joined - {self._agent}, joined & _joined(onset.kept), frozenset[str]())):
+        kept = frozenset[str]() if onset.kept is None else joined_members(onset.kept)
+        for demand in dict.fromkeys((joined, joined - {self._agent}, joined & kept, frozenset[str]())):
             motion = _demand(motion, demand)
             fault = self._judge(motion)
             if not fault:
@@ -253,13 +255,6 @@ def _demand(motion: Motion, joined: frozenset[str]) -> Motion:
     if len(joined) > 1:
         return structs.replace(motion, connection="joined", joined=tuple(sorted(joined)))
     return structs.replace(motion, connection="none", joined=())
-
-
-def _joined(motion: Motion | None) -> frozenset[str]:
-    """Members that a motion keeps in one network."""
-    if motion is None:
-        return frozenset()
-    return frozenset(way.member for way in motion.ways) if motion.connection == "team" else frozenset(motion.joined)
 
 
 def _point(place: Floats) -> Point:

@@ -42,6 +42,7 @@ from numpy.typing import NDArray
 
 from agents.map_picture import draw_map
 from agents.mission import Mission
+from agents.motion_level import certified_level
 from agents.recorder_columns import (
     Columns,
     body_columns,
@@ -246,9 +247,8 @@ class RerunRecorder:
         ends = [way.waypoints[mark] for way in motion.ways if way.scheduled for mark in sorted({*way.stages[1:]})]
         self._gather(now_ns, "world/motion/ways", links_columns, ways)
         self._gather(now_ns, "world/motion/stages", places_columns, ends if ways else [])
-        free = any(self._roles.get(way.member) == "tracked_agent" for way in motion.ways)
-        level = {"none": 0, "joined": 1, "team": 3 if free else 2}[motion.connection]
-        self._gather(now_ns, "certified", scalar_columns, [float(level)])
+        agent = next((name for name, role in self._roles.items() if role == "tracked_agent"), "")
+        self._gather(now_ns, "certified", scalar_columns, [float(certified_level(motion, agent))])
 
     def _draw_advance(self, now_ns: int, advance: Advance) -> None:
         in_hand = [

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from msgspec import json
+from msgspec import json, structs
 
+from agents.certificate_judge import certificate_judge
 from launcher.mission_trace import MissionTrace
 from launcher.report import Metrics, measure
 from launcher.review import merge, read_records
@@ -24,10 +25,23 @@ def conclude(folder: RunFolder) -> Metrics:
 
 
 def measure_run(folder: RunFolder) -> Metrics:
-    """Measure a run whose recordings have been merged, and write ``metrics.json``. Raises ValueError as above."""
+    """Measure a run whose recordings have been merged, and write ``metrics.json``.
+
+    Every motion that was ordered is certified once more, from the recording alone.
+
+    Raises:
+        ValueError: as above.
+    """
     mission = folder.read_mission()
     environment = Environment.load(folder.path / mission.map_path)
     trace = MissionTrace.of(read_records(folder.recording), mission)
     metrics = measure(trace, environment)
+    judge = certificate_judge(mission, environment)
+    refuted = tuple(
+        f"the motion ordered at {time_s:.2f} s is not certified: {fault}"
+        for time_s, ordered in trace.motions
+        if (fault := judge(ordered.motion))
+    )
+    metrics = structs.replace(metrics, failures=metrics.failures + refuted)
     folder.metrics_file.write_bytes(json.format(json.encode(metrics), indent=1) + b"\n")
     return metrics

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.base_station import silence_s
+from agents.motion_level import AGENT, CHAIN, TEAM, certified_level
 from launcher.contacts import Overlap, find_overlaps
 from launcher.mission_trace import MissionTrace, Trail
 from launcher.wording import counted
@@ -237,10 +238,8 @@ def _certified(trace: MissionTrace) -> CertifiedShares | None:
         return None
     begins_s = np.array([time_s for time_s, _ in trace.motions] + [trace.duration_s])
     lengths_s = np.diff(begins_s)
-    orders = [ordered.motion for _, ordered in trace.motions]
-    agents = [any(way.member == trace.agent for way in motion.ways) for motion in orders]
-    team = np.array([motion.connection == "team" for motion in orders])
-    judged = np.column_stack((team & agents, team, team | [motion.connection == "joined" for motion in orders]))
+    levels = np.array([certified_level(ordered.motion, trace.agent) for _, ordered in trace.motions])
+    judged = np.column_stack([levels >= level for level in (AGENT, TEAM, CHAIN)])
     seconds = float(lengths_s.sum())
     agent, whole, chain = (judged.T @ lengths_s / seconds).tolist() if seconds > 0.0 else (0.0, 0.0, 0.0)
     return CertifiedShares(seconds=seconds, agent=agent, team=whole, chain=chain)

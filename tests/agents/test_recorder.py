@@ -257,7 +257,9 @@ def test_a_motion_is_drawn_with_its_stages_and_how_far_everybody_is(tmp_path: Pa
         way("robot_2", (2.0, 10.0), (2.0, 11.0)),
     )
     agent = way("agent", (16.0, 10.0), (16.0, 11.0), scheduled=False)
-    motion = Motion(plan=0, revision=3, first_stage=5, released=-1, ways=ways, connection="joined", joined=("base",))
+    motion = Motion(
+        plan=0, revision=3, first_stage=5, released=-1, ways=ways, connection="joined", joined=("base", "robot_1")
+    )
     recorder.record(1.0, "base", Ordered(motion=motion))
     recorder.record(1.1, "base", Advance(released=6, finished={"robot_1": 5, "robot_2": 6}))
     recorder.record(2.0, "base", Ordered(motion=structs.replace(motion, connection="team", ways=(*ways, agent))))

@@ -178,7 +178,12 @@ def test_certificates_count_for_as_long_as_their_motions() -> None:
         return time_s, "base", Ordered(motion=motion)
 
     records = [entry for peer in ("base", "agent", "robot1", "robot2") for entry in tracks(peer, (1.0, 1.0))]
-    records += [order(2.0, 0, "team", "agent"), order(4.0, 1, "team"), order(7.0, 2, "joined"), order(9.0, 3, "none")]
+    records += [
+        order(2.0, 0, "team", "agent"),
+        order(4.0, 1, "team"),
+        order(7.0, 2, "joined", "robot2"),
+        order(9.0, 3, "none"),
+    ]
     records += [(1.0 * n, "base", Planned(planning_s=0.1, in_sight_s=0.2 * n)) for n in range(4)]
     metrics = judge(records)
     assert (metrics.plans, metrics.motions) == (2, 4)

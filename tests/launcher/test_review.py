@@ -16,12 +16,13 @@ from PIL import Image
 from rerun.chunk import RrdReader
 
 from agents.recorder import RerunRecorder
-from agents.records import AnyRecord, Connectivity, Decision, Track
+from agents.records import AnyRecord, Connectivity, Decision, Ordered, Track
 from launcher import review
 from launcher.conclusion import conclude, measure_run
 from launcher.report import MissionTrace
 from launcher.review import RecordingFault, merge, open_viewer, read_records
 from launcher.run_folder import RunFolder
+from protocol.messages import MemberWay, Motion
 from tests.agents import synthetic_mission as synthetic
 
 RESTART_S, BACK_S = 5.0, 7.0
@@ -127,6 +128,30 @@ def test_merging_twice_changes_nothing(run_folder: Path, tmp_path: Path) -> None
     (tmp_path / "recordings").symlink_to(run_folder / "recordings")
     first, second = conclude(RunFolder(tmp_path)), conclude(RunFolder(tmp_path))
     assert first == second == measure_run(RunFolder(run_folder))
+
+
+@pytest.mark.parametrize("collides", [False, True])
+def test_motions_are_certified_once_more_from_the_recording(run_folder: Path, tmp_path: Path, collides: bool) -> None:
+    for name in ("mission.json", "map.json"):
+        (tmp_path / name).write_bytes((run_folder / name).read_bytes())
+    ends = {"base": (1.0, 1.0), "robot_1": (10.0, 5.0), "robot_2": (11.0, 5.0) if not collides else (10.0, 5.5)}
+    ways = tuple(
+        MemberWay(
+            member=name, radius_m=0.3, speed_m_s=1.0, stages=(0, 1) if name != "base" else (0, 0),
+            waypoints=(end,) if name == "base" else ((end[0], 2.0), end),
+        )
+        for name, end in ends.items()
+    )  # fmt: skip
+    motion = Motion(plan=0, revision=0, first_stage=0, released=0, ways=ways, connection="none")
+    recorder = RerunRecorder(tmp_path / "recordings" / "base.0.rrd", team="demo", recording_id="run", peer="base")
+    recorder.record(1.5, "base", Ordered(motion=motion))
+    recorder.close()
+    failures = conclude(RunFolder(tmp_path)).failures
+    assert len(failures) == collides
+    for failure in failures:
+        assert failure.startswith(
+            "the motion ordered at 1.50 s is not certified: in stage 0 robot_1 and robot_2 can come"
+        )
 
 
 @pytest.mark.parametrize("seed", range(3))
