@@ -19,7 +19,7 @@ could go at once, else that on which it holds longest.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, NamedTuple
 
@@ -150,14 +150,18 @@ class MotionPlanner:
         options = [options[index] for index in sorted(range(len(options)), key=lambda index: conflicts[index])]
         members = len(onset.places)  # those that go as they please come last
         candidates: list[Candidate] = []
-        for laxity, option, joined in self._demands(onset, options):
-            found = self._find(onset, option, joined, way, lost)
-            holds_s = prospect.worth(found.schedule.positions(prospect.times_s)[:, :members])
-            worth_s = holds_s - LAXITY_S * laxity - STRANDED_S * (not found.arrives)
-            candidates.append(Candidate(worth_s, laxity, option, found))
-            if found.arrives and holds_s >= hoped_s - SLOWER_S:
+        for laxity in (0, 3, 1, 2):  # what asks for nothing says what can be won by asking for less
+            for option in options:
+                joined = self._demand(onset, option, laxity)
+                found = self._find(onset, option, joined, way, lost)
+                holds_s = prospect.worth(found.schedule.positions(prospect.times_s)[:, :members])
+                worth_s = holds_s - LAXITY_S * laxity - STRANDED_S * (not found.arrives)
+                candidates.append(Candidate(worth_s, laxity, option, found))
+                if laxity == 0 and found.way == "direct" and holds_s >= hoped_s - SLOWER_S:
+                    break
+            best = max(candidates, key=lambda candidate: candidate.worth_s)
+            if best.found.arrives and (best.laxity < laxity or best.worth_s >= hoped_s - SLOWER_S):
                 break
-        best = max(candidates, key=lambda candidate: candidate.worth_s)
         less = best.laxity > 1 or not best.found.arrives
         return self._certify(onset, best.option, best.found, lost, candidates[0].found.reason if less else "")
 
@@ -189,15 +193,10 @@ class MotionPlanner:
             effort=EFFORT if joined else LAST_EFFORT,
         )
 
-    def _demands(self, onset: Onset, options: Sequence[Option]) -> Iterator[tuple[int, Option, frozenset[str]]]:
-        """What is asked of lines of sight, from strict to lax (see the module), and how lax that is."""
+    def _demand(self, onset: Onset, option: Option, laxity: int) -> frozenset[str]:
+        """Who is to be one network, from strict to lax (see the module)."""
         team = frozenset(onset.places)
-        for laxity in range(4):
-            for option in options:
-                chain = frozenset((self.base, *option.ends))
-                joined = (team | {self._agent}, team, chain, frozenset[str]())[laxity]
-                if laxity != 2 or 1 < len(chain) < len(team):
-                    yield laxity, option, joined
+        return (team | {self._agent}, team, frozenset((self.base, *option.ends)), frozenset[str]())[laxity]
 
     def _geodesics_of(self, onset: Onset, option: Option) -> dict[str, Floats]:
         """Everybody's shortest way (m, 2), metres; of one point for those that stand."""
@@ -232,7 +231,7 @@ class MotionPlanner:
         joined = frozenset(found.connection)
         kept = frozenset[str]() if onset.kept is None else joined_members(onset.kept)
         for demand in dict.fromkeys((joined, joined - {self._agent}, joined & kept, frozenset[str]())):
-            motion = _demand(motion, demand)
+            motion = _ask(motion, demand)
             fault = self._judge(motion)
             if not fault:
                 return Course(motion, option, found.arrives, reason)
@@ -248,7 +247,7 @@ def _standing_somewhere(name: str, way: Floats, radius_m: float, stages: int) ->
     )  # fmt: skip
 
 
-def _demand(motion: Motion, joined: frozenset[str]) -> Motion:
+def _ask(motion: Motion, joined: frozenset[str]) -> Motion:
     """A motion in which these members are to stay in one network."""
     if joined.issuperset(way.member for way in motion.ways):
         return structs.replace(motion, connection="team", joined=())

@@ -62,13 +62,14 @@ class TeamPlanner:
         in_sight_s = min(LOOKED_AHEAD_S, self._time_in_sight(watcher, question))
         if not robots or _goals(plan) == question.heading:
             return Answer(plan, None, in_sight_s=in_sight_s)
-        exchanged = self._exchange(plan, robots, question.previous)
-        options = [_option(choice, question.previous, robots) for choice in dict.fromkeys((plan, exchanged))]
+        going = {name for name, place in _goals(plan).items() if place != robots[name]}
+        plans = [plan, *(self._exchange(plan, robots, among, question.previous) for among in (going, robots))]
+        options = {_option(choice, question.previous, robots): choice for choice in dict.fromkeys(plans)}
         try:
-            course = self._motions.plan(onset, options, way, question.lost)
+            course = self._motions.plan(onset, list(options), way, question.lost)
         except ValueError as problem:
             return Answer(plan, None, str(problem), in_sight_s)
-        return Answer(plan if course.option is options[0] else exchanged, course, in_sight_s=in_sight_s)
+        return Answer(options[course.option], course, in_sight_s=in_sight_s)
 
     def _time_in_sight(self, watcher: Point, question: Question) -> float:
         """From the onset on; the agent may have gone anywhere until then."""
@@ -76,14 +77,18 @@ class TeamPlanner:
         gone_m = question.lead_s * speed_m_s
         return time_in_sight(self._environment, watcher, question.way[0], speed_m_s, gone_m)
 
-    def _exchange(self, plan: Plan, robots: Mapping[str, Point], previous: Plan | None) -> Plan:
-        """The same places, but so that nobody overtakes: the search for relays does not ask who is in whose way."""
+    def _exchange(self, plan: Plan, robots: Mapping[str, Point], among: Collection[str], previous: Plan | None) -> Plan:
+        """The same places, but none of some robots overtakes another: the search for relays does not ask that."""
         before = {} if previous is None else {place.robot: place.position for place in previous.placements}
-        names = assign(self._motions.geodesics, robots, [place.position for place in plan.placements], before)
-        renamed = {place.robot: name for place, name in zip(plan.placements, names, strict=True)}
+        theirs = [place for place in plan.placements if place.robot in among]
+        starts = {name: place for name, place in robots.items() if name in among}
+        names = assign(self._motions.geodesics, starts, [place.position for place in theirs], before)
+        renamed = {place.robot: name for place, name in zip(theirs, names, strict=True)}
         if all(old == new for old, new in renamed.items()):
             return plan
-        placements = tuple(structs.replace(place, robot=renamed[place.robot]) for place in plan.placements)
+        placements = tuple(
+            structs.replace(place, robot=renamed.get(place.robot, place.robot)) for place in plan.placements
+        )
         edges = tuple((renamed.get(one, one), renamed.get(other, other)) for one, other in plan.edges)
         reason = plan.reason.removesuffix(EXCHANGED) + EXCHANGED
         return replace(plan, placements=placements, edges=edges, reason=reason)
