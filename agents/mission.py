@@ -49,6 +49,19 @@ class OnDemand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 Behaviour: TypeAlias = Scripted | Wandering | OnDemand
 
 
+class Ranging(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """How the distance to the agent is measured, and how far clocks can be apart."""
+
+    rate_hz: float = 4.0
+    """Every robot and the base station asks so often."""
+    bound_m: float = 0.2
+    """No range is wrong by more."""
+    noise_m: float = 0.1
+    """What the built-in radio is really wrong by, at most: evenly spread up to this, and no more than ``bound_m``."""
+    clock_bound_s: float = 0.05
+    """The most by which the clocks of any two peers differ."""
+
+
 class Mission(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Everything that the peers of a team must agree on."""
 
@@ -81,6 +94,9 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     """Of the grid of points; None: one that suits the map."""
     search: Literal["chain", "exact", "one-edge", "fixed"] = "chain"
     """How the leader finds chains (:mod:`agents.proposals`)."""
+    announces: bool = True
+    """Whether the agent says where it is and where it goes; else it answers ranging, and nothing more."""
+    ranging: Ranging = Ranging()
     planning_delay_s: float = 0.02
     """In simulation: modelled duration of a planning job."""
 

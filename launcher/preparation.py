@@ -13,7 +13,7 @@ import numpy as np
 
 from agents.casting import Casting
 from agents.leader import MOST_TO_PLAN_ON, DeploymentPlanner, remedy_for
-from agents.mission import Behaviour, Mission, OnDemand, RosterEntry, Scripted, Wandering
+from agents.mission import Behaviour, Mission, OnDemand, Ranging, RosterEntry, Scripted, Wandering
 from agents.movement_authority import Onset
 from agents.planning_job import Question
 from launcher.ground import Ground, named
@@ -151,7 +151,7 @@ def _automatic_starts(ground: Ground, scenario: Scenario) -> tuple[Point, ...]:
 
 def _mission(scenario: Scenario, starts: tuple[Point, ...]) -> Mission:
     """The mission of a checked scenario."""
-    agent = scenario.agent
+    agent, ranging = scenario.agent, scenario.ranging
     roster = [
         RosterEntry(name=BASE, role="base_station", start=scenario.base.position),
         RosterEntry(name=AGENT, role="tracked_agent", start=agent.start),
@@ -183,6 +183,13 @@ def _mission(scenario: Scenario, starts: tuple[Point, ...]) -> Mission:
         search=scenario.planning.search,
         duration_s=scenario.duration_s,
         seed=scenario.seed,
+        announces=agent.announces,
+        ranging=Ranging(
+            rate_hz=ranging.rate_hz,
+            bound_m=ranging.bound_m,
+            noise_m=ranging.bound_m / 2 if ranging.noise_m is None else ranging.noise_m,
+            clock_bound_s=ranging.clock_bound_s,
+        ),
         epoch_unix_s=0.0,
     )
 

@@ -63,6 +63,8 @@ class Agent(_Table, frozen=True, kw_only=True):
     pause_s: Pause = 2.0
     start_after_s: Pause = 3.0
     around_corner_share: Annotated[float, Meta(ge=0, le=1)] = 0.5
+    announces: bool = True
+    """Whether it says where it is and goes; else it answers ranging, and nothing more."""
     speed_m_s: Speed = 0.5
     radius_m: Metres = 0.2
 
@@ -98,6 +100,18 @@ class Planning(_Table, frozen=True, kw_only=True):
     valid_for_s: Annotated[float, Meta(ge=0.2, le=86400)] = 3.0
 
 
+class Ranging(_Table, frozen=True, kw_only=True):
+    """``[ranging]``: how robots and base station measure their distance to the agent."""
+
+    rate_hz: Annotated[float, Meta(ge=0.1, le=20)] = 4.0
+    bound_m: Annotated[float, Meta(ge=0, le=100)] = 0.2
+    """No range is wrong by more."""
+    noise_m: Annotated[float, Meta(ge=0, le=100)] | None = None
+    """What ranges are really wrong by, at most; half of ``bound_m`` if not given."""
+    clock_bound_s: Annotated[float, Meta(ge=0, le=1)] = 0.05
+    """The most by which the clocks of any two peers differ."""
+
+
 class Network(_Table, frozen=True, kw_only=True):
     """``[network]``: peer i listens on 127.0.0.1, port ``base_port + i``; without it, on free ports."""
 
@@ -121,6 +135,7 @@ class Scenario(_Table, frozen=True, kw_only=True):
     seed: Annotated[int, Meta(ge=0, le=2**53)] = 0
     rates: Rates = Rates()
     planning: Planning = Planning()
+    ranging: Ranging = Ranging()
     network: Network = Network()
 
     @property
@@ -259,6 +274,12 @@ def _contradiction(scenario: Scenario) -> str:
         )
     if len(robots.starts) > MOST_ROBOTS:
         return f"robots.starts has {len(robots.starts)} places; a team has at most {MOST_ROBOTS} robots"
+    ranging = scenario.ranging
+    if ranging.noise_m is not None and ranging.noise_m > ranging.bound_m:
+        return (
+            f"ranging.noise_m ({ranging.noise_m:g}) is more than ranging.bound_m ({ranging.bound_m:g}), and the "
+            "estimate would lose the agent; make bound_m at least as large"
+        )
     planning, control_s = scenario.planning, 1 / scenario.rates.control_hz
     if planning.spacing_m is not None and planning.placements == "cells":
         return "planning.spacing_m is given and planning.placements is 'cells'; only points are on a grid, remove one"
