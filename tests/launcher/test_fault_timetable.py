@@ -31,7 +31,8 @@ def values(kind: type) -> st.SearchStrategy[Fault]:
     names = st.lists(st.sampled_from(PEERS), min_size=1, max_size=3, unique=True).map(tuple)
     known = {
         "at_s": st.floats(0.0, 1e3), "for_s": st.none() | st.floats(0.1, 1e3), "group": names,
-        "disk": st.sampled_from(("kept", "lost")), "noticed_after_s": shares, "who": st.sampled_from(("base", "leader")),
+        "disk": st.sampled_from(("kept", "lost")), "noticed_after_s": shares,
+        "who": st.sampled_from(("agent", "leader")),
         "speakers": names | st.just(()), "hearers": names | st.just(()), "share": shares, "burst": st.floats(1.0, 9.0),
         "least_s": shares, "mean_s": shares, "tail": st.sampled_from(("uniform", "exponential", "log-normal")),
         "spikes": shares, "spike_s": shares, "overtaking": st.booleans(), "takes_s": shares, "full": st.booleans(),
