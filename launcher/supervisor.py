@@ -1,8 +1,10 @@
 """One process per peer: started, restarted when it crashes, stopped in time, and never left behind.
 
 Each peer is in a session of its own, so that Ctrl-C reaches only the launcher, which then stops the team in order. A
-peer asks the kernel to be told when its launcher dies (``PR_SET_PDEATHSIG``), so that a killed launcher leaves nobody
-behind.
+peer asks the kernel to be killed when its launcher dies (``PR_SET_PDEATHSIG``), so that a killed launcher leaves nobody
+behind, not even a peer that is paused.
+
+Peers can also be killed and paused on purpose (:mod:`launcher.chaos`). That is no crash, and nobody is given up for it.
 """
 
 from __future__ import annotations
@@ -43,6 +45,21 @@ class Peer:
     crashes: list[float] = field(default_factory=list)
     """When it crashed, monotonic seconds."""
     given_up: bool = False
+    killed: Killed | None = None
+    """What its process was killed for, until it is back."""
+
+    @property
+    def gone(self) -> bool:
+        """Whether it will not come back."""
+        return self.given_up or (self.killed is not None and self.killed.back_after_s is None)
+
+
+@dataclass(frozen=True)
+class Killed:
+    """On purpose."""
+
+    back_after_s: float | None
+    """Until another process is started under the name; None: never."""
 
 
 class Supervisor:
@@ -53,7 +70,7 @@ class Supervisor:
         folder: of the run; holds ``mission.json``.
         planner: the team's, for forks.
         announce: is told in a sentence what becomes of peers.
-        find: where the body of a peer was last heard of; a mind that is restarted finds its body there.
+        find: where the body of a peer is; a mind that is restarted finds its body there.
     """
 
     def __init__(
@@ -71,6 +88,7 @@ class Supervisor:
         self._find = find
         self._stopping = asyncio.Event()
         self._watchers: list[asyncio.Task[None]] = []
+        self._paused: dict[str, asyncio.TimerHandle] = {}
 
     def launch(self) -> None:
         """Start a process for every peer. Call it before there is an event loop, a bus or a thread: it forks."""
@@ -83,9 +101,42 @@ class Supervisor:
         """Restart from now on what crashes. Needs the event loop that :meth:`stop` runs in."""
         self._watchers = [asyncio.create_task(self._watch(peer)) for peer in self.peers.values()]
 
+    def kill(self, name: str, back_after_s: float | None) -> bool:
+        """Kill a peer's process, whatever it does; False if it has none at the moment.
+
+        Args:
+            name: of the peer.
+            back_after_s: until another one is started under the name; None: never.
+        """
+        peer = self.peers[name]
+        if peer.pid is None:
+            return False
+        peer.killed = Killed(back_after_s)
+        os.kill(peer.pid, signal.SIGKILL)
+        return True
+
+    def pause(self, name: str, for_s: float) -> bool:
+        """Let a peer's process stand still; False if it has none, or stands still already. Needs the event loop."""
+        pid = self.peers[name].pid
+        if pid is None or name in self._paused:
+            return False
+        os.kill(pid, signal.SIGSTOP)
+        self._paused[name] = asyncio.get_running_loop().call_later(for_s, self.resume, name)
+        return True
+
+    def resume(self, name: str) -> None:
+        """Let a peer that stands still go on, if it does."""
+        timer = self._paused.pop(name, None)
+        pid = self.peers[name].pid
+        if timer is not None and pid is not None:
+            timer.cancel()
+            os.kill(pid, signal.SIGCONT)
+
     async def stop(self) -> None:
         """Ask every process to end, kill what still runs after :data:`TERMINATE_S`, wait until all are gone."""
         self._stopping.set()
+        for name in tuple(self._paused):
+            self.resume(name)
         self._signal(signal.SIGTERM)
         _, late = await asyncio.wait(self._watchers, timeout=TERMINATE_S)
         if late:
@@ -124,21 +175,30 @@ class Supervisor:
             peer.pid = None
             if self._stopping.is_set():
                 return
-            peer.crashes = [when for when in peer.crashes if monotonic() - when < STEADY_S] + [monotonic()]
-            how = f"was killed by {signal.Signals(-status).name}" if status < 0 else f"ended with status {status}"
-            if len(peer.crashes) > RESTARTS:
-                peer.given_up = True
-                self._announce(
-                    f"{peer.name} {how}, the {len(peer.crashes)}th time within {STEADY_S:g} s: given up; "
-                    f"see {self.log(peer)}"
-                )
+            if (timer := self._paused.pop(peer.name, None)) is not None:
+                timer.cancel()
+            pause_s = self._judge_crash(peer, status) if peer.killed is None else peer.killed.back_after_s
+            if pause_s is None:
                 return
-            self._announce(f"{peer.name} {how}; restarting it ({len(peer.crashes)} of {RESTARTS})")
-            pause_s = BACKOFF_S * 2 ** (len(peer.crashes) - 1)
-            # The jitter keeps peers that crashed together from coming back together; nothing is reproducible here.
             with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(self._stopping.wait(), pause_s * (1 + random.random()))
+                await asyncio.wait_for(self._stopping.wait(), pause_s)
             if self._stopping.is_set():
                 return
             peer.incarnation += 1
+            peer.killed = None
             peer.pid = self.start_process(peer)
+
+    def _judge_crash(self, peer: Peer, status: int) -> float | None:
+        """Note a crash and say so; how long to wait before a restart, None if there is to be none."""
+        peer.crashes = [when for when in peer.crashes if monotonic() - when < STEADY_S] + [monotonic()]
+        how = f"was killed by {signal.Signals(-status).name}" if status < 0 else f"ended with status {status}"
+        if len(peer.crashes) > RESTARTS:
+            peer.given_up = True
+            self._announce(
+                f"{peer.name} {how}, the {len(peer.crashes)}th time within {STEADY_S:g} s: given up; "
+                f"see {self.log(peer)}"
+            )
+            return None
+        self._announce(f"{peer.name} {how}; restarting it ({len(peer.crashes)} of {RESTARTS})")
+        # The jitter keeps peers that crashed together from coming back together; nothing is reproducible here.
+        return BACKOFF_S * 2 ** (len(peer.crashes) - 1) * (1 + random.random())
