@@ -22,7 +22,7 @@ from agents.orders import changes_topology, first_orders, is_decision, renew
 from agents.planning_job import Answer, Question
 from agents.records import Advance, Decision, LogLine, Ordered, Planned, Track
 from agents.rhythm import EARLY_S, Rhythm
-from agents.role import Compute, Effect, Event, Heard, JobDone, Publish, Record, WakeAt, Woken
+from agents.role import Compute, Effect, Event, Heard, JobDone, Publish, Record, WakeAt, Woken, Written
 from planning.environment import Environment
 from protocol.bus import PeerAppeared, PeerVanished
 from protocol.messages import AnyBody, Authority, Heartbeat, Intent, Mode, Point, State
@@ -126,7 +126,7 @@ class BaseStation:
                 self._lose(peer, "its process has ended or cannot be reached", now_s)
             case JobDone(job=name) if name == PLANNING:
                 self._planned(event, now_s)
-            case JobDone() | PeerAppeared():
+            case JobDone() | Written() | PeerAppeared():
                 pass
         if not isinstance(event, Woken) and not self._urgent and not self._effects and now_s < self._say_at_s - EARLY_S:
             return ()

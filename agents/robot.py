@@ -25,7 +25,7 @@ from agents.mission import Mission
 from agents.path_follower import STANDING, Leg
 from agents.records import LogLine
 from agents.rhythm import EARLY_S
-from agents.role import Compute, Drive, Effect, Event, Heard, JobDone, Record, WakeAt, Woken
+from agents.role import Compute, Drive, Effect, Event, Heard, JobDone, Record, WakeAt, Woken, Written
 from agents.self_report import SelfReport
 from agents.stage_follower import ASTRAY_M, StageFollower
 from protocol.bus import PeerAppeared, PeerVanished
@@ -96,7 +96,7 @@ class Robot:
                 return (WakeAt(now_s),) if news and self._mode == "yielding" else ()
             case JobDone(job=name) if name == CERTIFICATE:
                 return self._take_verdict(event, now_s)
-            case Heard() | JobDone() | PeerAppeared() | PeerVanished():
+            case Heard() | JobDone() | Written() | PeerAppeared() | PeerVanished():
                 return ()
 
     def _take_orders(self, sender: str, orders: Deployment, now_s: float) -> Sequence[Effect]:

@@ -2,22 +2,30 @@
 
 A :class:`Role` knows no socket, no clock, no thread and no file. :mod:`agents.shell` feeds it events and carries out
 its effects, live (:mod:`agents.runtime`) and in virtual time (``launcher.simulation``) alike, so the very same role
-objects run in both worlds. A role is deterministic: equal events at equal times give equal effects.
-
-Two more effects belong here and come with the election: ``Persist`` (a promise is on disk before it is said) and
-``Ask``/``Answer``.
+objects run in both worlds. A role is deterministic: equal events at equal times give equal effects. Most are composed
+of parts (:mod:`agents.mind`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeAlias
+from typing import Any, Final, Protocol, TypeAlias
 
 from agents.records import AnyRecord
 from protocol.bus import PeerAppeared, PeerVanished
+from protocol.core import Persist, Written
 from protocol.keys import Address
 from protocol.messages import AnyBody, Envelope, Point
+
+__all__ = [
+    "RETRY_S", "Compute", "Drive", "Effect", "Event", "Heard", "JobDone", "Persist", "Publish", "Record", "Role",
+    "WakeAt", "Woken", "Written",
+]  # fmt: skip
+
+
+RETRY_S: Final = 0.2
+"""Who failed while it was awake, and so asked for no further wake-up, is woken again after this."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +53,8 @@ class JobDone:
     failure: str = ""
 
 
-Event: TypeAlias = Woken | Heard | JobDone | PeerAppeared | PeerVanished
+Event: TypeAlias = Woken | Heard | JobDone | Written | PeerAppeared | PeerVanished
+"""``Written`` tells what became of a ``Persist``; both are those of :mod:`protocol.core`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +103,7 @@ class Compute:
     arguments: tuple[Any, ...] = ()
 
 
-Effect: TypeAlias = Publish | Drive | Record | WakeAt | Compute
+Effect: TypeAlias = Publish | Drive | Record | WakeAt | Compute | Persist
 
 
 class Role(Protocol):
@@ -103,8 +112,8 @@ class Role(Protocol):
     hears: frozenset[str]
     """Kinds of messages that it listens to; the shell does not even decode the others."""
 
-    def start(self, now_s: float, position: Point) -> Sequence[Effect]:
+    def start(self, now_s: float, position: Point) -> Iterable[Effect]:
         """First effects; must contain a :class:`WakeAt`."""
 
-    def handle(self, event: Event, now_s: float) -> Sequence[Effect]:
-        """Effects of one event. Never raises on what other peers say."""
+    def handle(self, event: Event, now_s: float) -> Iterable[Effect]:
+        """Effects of one event, carried out one by one as they come. Never raises on what other peers say."""

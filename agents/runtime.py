@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from agents.mission import Mission
     from agents.recorder import RerunRecorder
     from agents.records import AnyRecord
-    from agents.role import Compute, JobDone
+    from agents.role import Compute, JobDone, Written
     from planning.environment import Environment
     from protocol.inbox import Inbox
 
@@ -48,12 +48,12 @@ class Ending:
 
     def __init__(self) -> None:
         self.wished = threading.Event()
-        self._inbox: Inbox[JobDone] | None = None
+        self._inbox: Inbox[JobDone | Written] | None = None
         signals = {signal.SIGTERM, signal.SIGINT}
         signal.pthread_sigmask(signal.SIG_BLOCK, signals)  # inherited by every later thread: only sigwait takes them
         threading.Thread(target=self._wait, args=(signals,), name="signals", daemon=True).start()
 
-    def wakes(self, inbox: Inbox[JobDone]) -> None:
+    def wakes(self, inbox: Inbox[JobDone | Written]) -> None:
         """Have the reader of this inbox woken when the wish comes."""
         self._inbox = inbox
         if self.wished.is_set():
@@ -70,7 +70,7 @@ class Ending:
 class Worker:
     """A thread beside the control loop that runs computations one after the other."""
 
-    def __init__(self, inbox: Inbox[JobDone]) -> None:
+    def __init__(self, inbox: Inbox[JobDone | Written]) -> None:
         self._inbox = inbox
         self._jobs: SimpleQueue[Compute] = SimpleQueue()
         threading.Thread(target=self._run, name="worker", daemon=True).start()
@@ -129,17 +129,19 @@ def live(
     """
     from agents.casting import Casting
     from agents.records import LogLine
-    from agents.role import JobDone
+    from agents.role import JobDone, Written
     from agents.shell import PeerShell
+    from agents.voter_file import VoterFile
     from planning.environment import Environment
     from protocol.inbox import Inbox
     from protocol.zenoh_bus import ZenohBus
 
-    epoch_monotonic_s = time.monotonic() - (time.time() - mission.epoch_unix_s)
+    epoch_s = time.clock_gettime(time.CLOCK_BOOTTIME) - (time.time() - mission.epoch_unix_s)
 
     def now() -> float:
-        # Mission time follows the monotonic clock from here on: a wall clock may be set while we drive.
-        return time.monotonic() - epoch_monotonic_s
+        # Mission time follows this clock from here on: a wall clock may be set while we drive. It goes on while the
+        # machine is suspended, which leases count on (docs/election.md).
+        return time.clock_gettime(time.CLOCK_BOOTTIME) - epoch_s
 
     environment = Environment.load(folder / mission.map_path)
     casting = Casting(mission, environment, planner)
@@ -152,8 +154,10 @@ def live(
         if isinstance(what, LogLine):
             print(f"{time_s:8.3f} {what.level}: {what.text}", file=sys.stderr, flush=True)
 
-    inbox: Inbox[JobDone] = Inbox()
+    inbox: Inbox[JobDone | Written] = Inbox()
     worker = Worker(inbox)
+    voter_file = VoterFile(folder, name)
+    voter_file.serve(inbox.put)
     ending.wakes(inbox)
     endpoints = [entry.endpoint for entry in mission.roster]
     bus = ZenohBus.open(mission.team, name, mission.entry(name).endpoint, endpoints, inbox.put)
@@ -170,12 +174,15 @@ def live(
             wall_clock=time.time,
             record=record,
             execute=worker.execute,
+            persist=voter_file.write,
         )
         shell.start()
         while not ending.wished.is_set():
             for event in inbox.wait(shell.wake_at_s - now()):
                 if isinstance(event, JobDone):
                     shell.finish(event)
+                elif isinstance(event, Written):
+                    shell.written(event)
                 else:
                     shell.take(event)
             if now() >= shell.wake_at_s:

@@ -2,26 +2,38 @@
 
 The world (:mod:`agents.runtime`, ``launcher.simulation``) owns time, threads and the bus. It calls
 :meth:`PeerShell.start` once, then :meth:`~PeerShell.take` for every event of the bus, :meth:`~PeerShell.finish` for
-every computation that has ended, and :meth:`~PeerShell.wake` when :attr:`~PeerShell.wake_at_s` has come; all from one
-thread.
+every computation that has ended, :meth:`~PeerShell.written` for every promise that is on disk or could not be put
+there, and :meth:`~PeerShell.wake` when :attr:`~PeerShell.wake_at_s` has come; all from one thread.
 """
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterable
 from typing import Final, Literal, TypeAlias
 
 from agents.driver import RobotDriver
 from agents.records import AnyRecord, LogLine
-from agents.role import Compute, Drive, Effect, Event, Heard, JobDone, Publish, Record, Role, WakeAt, Woken
+from agents.role import (
+    RETRY_S,
+    Compute,
+    Drive,
+    Effect,
+    Event,
+    Heard,
+    JobDone,
+    Persist,
+    Publish,
+    Record,
+    Role,
+    WakeAt,
+    Woken,
+    Written,
+)
 from protocol.bus import Bus, BusEvent, PeerAppeared, PeerVanished, Received
 from protocol.keys import Address, parse
 from protocol.messages import Envelope, Goal, MalformedMessage, decode, encode, kind_of
-
-RETRY_S: Final = 0.2
-"""A role that failed while it was awake, and so asked for no further wake-up, is woken again after this."""
 
 MAXIMUM_OPERATORS: Final = 64
 """Operators remembered at a time. Their names are not on the roster, so that the memory must be bounded."""
@@ -44,6 +56,7 @@ class PeerShell:
         wall_clock: seconds since 1970 (virtual ones in simulation), for the envelopes.
         record: puts a record of this peer into the recording: ``record(time_s, record)``.
         execute: starts a computation, which is to end in :meth:`finish`. Must not call it before it returns.
+        persist: puts a promise on disk, which is to end in :meth:`written`, likewise not before it returns.
     """
 
     def __init__(
@@ -60,6 +73,7 @@ class PeerShell:
         wall_clock: Callable[[], float],
         record: Callable[[float, AnyRecord], None],
         execute: Callable[[Compute], None],
+        persist: Callable[[Persist], None],
     ) -> None:
         self.wake_at_s = math.inf
         """Mission time at which :meth:`wake` is due."""
@@ -78,8 +92,11 @@ class PeerShell:
         self._wall_clock = wall_clock
         self._record = record
         self._execute = execute
+        self._persist = persist
         self._sequence = 0
         self._heard: dict[tuple[str, str], tuple[int, int]] = {}
+        self._incarnations: dict[str, int] = {}
+        """The latest one heard of each peer: it has replaced all before, whatever they said last and of what kind."""
         self._operators: dict[tuple[str, str], tuple[int, int]] = {}
         self._complained: set[tuple[str, str]] = set()
         """What has been logged once and is only counted from then on."""
@@ -106,6 +123,10 @@ class PeerShell:
     def finish(self, done: JobDone) -> None:
         """Pass the end of a computation on to the role."""
         self._tell(done, self._now())
+
+    def written(self, written: Written) -> None:
+        """Pass on to the role that a promise is on disk, or why not."""
+        self._tell(written, self._now())
 
     def wake(self) -> None:
         """Bring the body up to date and wake the role."""
@@ -139,6 +160,11 @@ class PeerShell:
         """Whether this is later than all that the sender has said of this kind; remembers it if so."""
         memory = self._operators if address.operator else self._heard
         source, order = (address.speaker, address.kind), (envelope.incarnation, envelope.sequence)
+        if not address.operator:
+            latest = self._incarnations.get(address.speaker, -1)
+            if envelope.incarnation < latest:
+                return False
+            self._incarnations[address.speaker] = envelope.incarnation
         if order <= memory.get(source, (-1, -1)):
             return False
         memory[source] = order
@@ -164,7 +190,7 @@ class PeerShell:
             kind = event.envelope.kind if isinstance(event, Heard) else type(event).__name__
             self._complain("error", (kind, failure), f"failed on {_describe(event)}: {failure}: {problem}"[:400])
 
-    def _carry_out(self, effects: Sequence[Effect], now_s: float) -> None:
+    def _carry_out(self, effects: Iterable[Effect], now_s: float) -> None:
         for effect in effects:
             match effect:
                 case Publish(body):
@@ -185,6 +211,8 @@ class PeerShell:
                     self.wake_at_s = time_s
                 case Compute():
                     self._execute(effect)
+                case Persist():
+                    self._persist(effect)
 
     def _publish(self, envelope: Envelope) -> None:
         self._sequence += 1
@@ -202,6 +230,8 @@ def _describe(event: Event) -> str:
             return f"{envelope.kind} of {envelope.sender}"
         case JobDone(job):
             return f"the end of {job}"
+        case Written():
+            return "the end of writing"
         case PeerAppeared(peer) | PeerVanished(peer):
             return f"the coming or going of {peer}"
         case Woken():

@@ -20,7 +20,7 @@ from agents.mission import Mission, OnDemand
 from agents.path_follower import STANDING, Leg, PathFollower, Routes, Unreachable
 from agents.records import LogLine
 from agents.rhythm import EARLY_S
-from agents.role import Drive, Effect, Event, Heard, JobDone, Publish, Record, WakeAt, Woken
+from agents.role import Drive, Effect, Event, Heard, JobDone, Publish, Record, WakeAt, Woken, Written
 from agents.self_report import SelfReport
 from planning.environment import Environment
 from protocol.bus import PeerAppeared, PeerVanished
@@ -76,7 +76,7 @@ class TrackedAgent:
                 return self._live(now_s, position)
             case Heard(address, envelope) if isinstance(envelope.body, Goal):
                 return self._answer(address.speaker, envelope.body, now_s)
-            case Heard() | JobDone() | PeerAppeared() | PeerVanished():
+            case Heard() | JobDone() | Written() | PeerAppeared() | PeerVanished():
                 return ()
 
     def _answer(self, operator: str, goal: Goal, now_s: float) -> Sequence[Effect]:

@@ -12,7 +12,7 @@ from msgspec import structs
 from agents.casting import Casting
 from agents.mission import Mission
 from agents.records import AnyRecord
-from agents.role import Compute, JobDone
+from agents.role import Compute, JobDone, Persist, Written
 from agents.shell import PeerShell
 from launcher.mission_trace import MissionTrace
 from planning.environment import Environment
@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 
 UNTIL_TOLD_S: Final = 60.0
 """Duration of a mission that sets none."""
+
+WRITING_S: Final = 0.005
+"""How long a disk takes to keep a promise."""
 
 
 class SimulatedPeer:
@@ -61,6 +64,7 @@ class SimulatedPeer:
             wall_clock=lambda: self._mission.epoch_unix_s + self._time.now_s,
             record=lambda time_s, record: self._record(time_s, self._name, record),
             execute=self._execute,
+            persist=self._persist,
         )
         self._shell.start()
         self._sleep()
@@ -77,6 +81,13 @@ class SimulatedPeer:
             failure = f"{type(problem).__name__}: {problem}"
         delay_s = self._mission.planning_delay_s
         self._time.call_at(self._time.now_s + delay_s, self._finish, JobDone(job.job, result, delay_s, failure))
+
+    def _persist(self, content: Persist) -> None:
+        self._time.call_at(self._time.now_s + WRITING_S, self._wrote, Written(content.token))
+
+    def _wrote(self, written: Written) -> None:
+        self._shell.written(written)
+        self._sleep()
 
     def _finish(self, done: JobDone) -> None:
         self._shell.finish(done)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from typing import TypeVar
 
 from agents.driver import DiscDriver
@@ -26,7 +26,7 @@ class Life:
         self.driver.advance(0.0)
         self.do(role.start(0.0, start))
 
-    def do(self, effects: Sequence[Effect]) -> None:
+    def do(self, effects: Iterable[Effect]) -> None:
         for effect in effects:
             match effect:
                 case Publish(body):

@@ -10,10 +10,24 @@ from hypothesis import strategies as st
 
 from agents.driver import DiscDriver
 from agents.records import AnyRecord, LogLine
-from agents.role import Compute, Drive, Effect, Event, Heard, JobDone, Publish, Record, WakeAt, Woken
-from agents.shell import MAXIMUM_OPERATORS, RETRY_S, PeerShell
+from agents.role import (
+    RETRY_S,
+    Compute,
+    Drive,
+    Effect,
+    Event,
+    Heard,
+    JobDone,
+    Persist,
+    Publish,
+    Record,
+    WakeAt,
+    Woken,
+    Written,
+)
+from agents.shell import MAXIMUM_OPERATORS, PeerShell
 from protocol.bus import PeerAppeared, PeerVanished, Received
-from protocol.messages import AnyBody, Envelope, Goal, Heartbeat, Point, decode, encode
+from protocol.messages import AnyBody, Envelope, Goal, Heartbeat, Point, State, decode, encode
 
 HEARTBEAT = Heartbeat(role="base_station", mode="waiting")
 
@@ -57,11 +71,13 @@ class Stage:
         self.now_s = 0.0
         self.records: list[AnyRecord] = []
         self.jobs: list[Compute] = []
+        self.promises: list[Persist] = []
         self.driver = DiscDriver((0.0, 0.0), 1.0)
         self.shell = PeerShell(
             self.role, self.driver, self.wire, name="robot1", team="team", incarnation=3,
             peers=["base", "agent", "robot1"], now=lambda: self.now_s, wall_clock=lambda: 1000.0 + self.now_s,
             record=lambda _, record: self.records.append(record), execute=self.jobs.append,
+            persist=self.promises.append,
         )  # fmt: skip
 
     @property
@@ -197,3 +213,18 @@ def test_passes_on_jobs_and_the_coming_and_going_of_others(stage: Stage) -> None
     for event in (PeerAppeared("base"), PeerVanished("base"), PeerAppeared("robot1"), PeerAppeared("stranger")):
         stage.shell.take(event)
     assert stage.role.events == [done, PeerAppeared("base"), PeerVanished("base")]
+
+
+def test_of_a_peer_started_again_nothing_said_before_counts_of_any_kind(stage: Stage) -> None:
+    stage.take(1, incarnation=1)
+    stage.take(9, "team/v1/base/state", body=State(position=(0.0, 0.0), velocity=(0.0, 0.0), mode="moving"))
+    assert [envelope.kind for envelope in stage.heard] == ["heartbeat"]
+    assert stage.shell.refused == {"stale": 1}
+
+
+def test_promises_go_to_the_disk_and_what_becomes_of_them_to_the_role(stage: Stage) -> None:
+    stage.role.effects = (Persist(b"promise", 4),)
+    stage.take(1)
+    assert stage.promises == [Persist(b"promise", 4)]
+    stage.shell.written(Written(4, "no space left"))
+    assert stage.role.events[-1] == Written(4, "no space left")
