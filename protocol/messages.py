@@ -53,6 +53,18 @@ Mode: TypeAlias = Literal["waiting", "moving", "yielding", "arrived", "holding"]
 """What a peer's body does: it has no orders yet, drives, lets others go first, stands where it should, or stands since
 it was told to or has no order that it can follow."""
 
+Edge: TypeAlias = tuple[Name, Name]
+"""A link of a tree between two members, in either order."""
+
+TreeNumber: TypeAlias = tuple[Count, Count]
+"""Epoch of the leader that proposed a tree, and its number in that epoch: later trees have greater numbers."""
+
+Verdict: TypeAlias = Literal["sees", "will", "refuses"]
+"""What the end of a link says of it: that it sees the other end, that it will where the proposal says, or neither."""
+
+Method: TypeAlias = Literal["optimum", "auction"]
+"""How a tree was found: by the leader's planner alone, or by the bids of all robots."""
+
 Connection: TypeAlias = Literal["team", "joined", "none"]
 """What is certified of lines of sight: that the whole team is one network at all times, that some of its members are in
 one network over any others, or nothing."""
@@ -267,15 +279,171 @@ class Vote(Body, frozen=True, kw_only=True, tag="vote"):
     """Chosen by the voter, another one each time that time has passed; comes back in warrants."""
 
 
-AnyBody: TypeAlias = Heartbeat | State | Intent | Goal | GoalReply | Deployment | VoteRequest | Vote
+class Tree(msgspec.Struct, frozen=True, kw_only=True):
+    """Who is to be linked with whom: a tree that joins all of its members, and nobody else."""
+
+    number: TreeNumber
+    members: Annotated[tuple[Name, ...], msgspec.Meta(min_length=1, max_length=64)]
+    edges: Annotated[tuple[Edge, ...], msgspec.Meta(max_length=63)]
+    reason: Text
+    """Why it took the place of the tree before."""
+
+
+class Milestone(msgspec.Struct, frozen=True, kw_only=True):
+    """The beginning of a stage of the team's motion."""
+
+    epoch: Count
+    plan: Count
+    revision: Count
+    stage: Count
+
+
+class NewLink(msgspec.Struct, frozen=True, kw_only=True):
+    """A link that a tree has and the one before had not."""
+
+    ends: Edge
+    since: Milestone | None = None
+    """From when on the ends are to see each other, as far as the motion goes; none: at once, where they stand."""
+
+
+class TreeProposal(msgspec.Struct, frozen=True, kw_only=True):
+    """The next tree. It is in force when both ends of every new link have confirmed it, and the leader says so."""
+
+    tree: Tree
+    links: Annotated[tuple[NewLink, ...], msgspec.Meta(max_length=63)]
+    """The new ones: in an epoch's first tree all of them."""
+    released: Annotated[tuple[Edge, ...], msgspec.Meta(max_length=63)]
+    """Links of the tree before that this one does without."""
+    method: Method
+    round: Count
+    """How often it has been said before; it is given up after a few rounds."""
+
+
+class Topology(Body, frozen=True, kw_only=True, tag="topology"):
+    """The leader's standing word on the team's tree: what is in force, and at most one proposal to change it.
+
+    Repeated. While a proposal is open the links of the tree in force are kept.
+    """
+
+    authority: Authority
+    warrant: Warrant
+    committed: Tree | None = None
+    """The tree in force; none: there has been none yet."""
+    proposal: TreeProposal | None = None
+    """Missing again: it is in force, or has been given up."""
+
+
+class LinkView(msgspec.Struct, frozen=True, kw_only=True):
+    """What one end says of a new link of its own."""
+
+    peer: Name
+    """The other end."""
+    verdict: Verdict
+    reason: Text = ""
+    """Why it refuses."""
+
+
+class Confirmation(Body, frozen=True, kw_only=True, tag="confirmation"):
+    """A peer's standing answer to the leader's word on the tree. Repeated; new links not judged yet are left out."""
+
+    proposal: TreeNumber | None = None
+    """The one that ``views`` are about."""
+    views: Annotated[tuple[LinkView, ...], msgspec.Meta(max_length=63)] = ()
+    """On those new links that the speaker is an end of."""
+    committed: Tree | None = None
+    """The last tree in force that it knows of: what a new leader starts from."""
+
+
+class Auction(Body, frozen=True, kw_only=True, tag="auction"):
+    """The leader asks what could be gained by another link in the place of one of the present tree's.
+
+    Every robot evaluates all links that could stand in the place of its own, the one towards the base station; the last
+    relay also that to the agent. Repeated until it closes.
+    """
+
+    authority: Authority
+    warrant: Warrant
+    auction: Count
+    """Number of the auction in this epoch."""
+    closes_in_s: Seconds
+    """Bids that come later are not counted."""
+    way: Annotated[tuple[Point, ...], msgspec.Meta(min_length=1, max_length=1000)]
+    """The agent's, from where it is."""
+    robots: Annotated[tuple[Placement, ...], msgspec.Meta(max_length=64)]
+    """Where the robots are that can be counted on."""
+    standing: Annotated[tuple[Name, ...], msgspec.Meta(max_length=64)]
+    """The relays of the present chain from the base station outward."""
+    obstacles: Annotated[tuple[Point, ...], msgspec.Meta(max_length=1000)] = ()
+    """Where nobody can stand."""
+    targets: Annotated[tuple[Point, ...], msgspec.Meta(max_length=1000)] = ()
+    """Where an agent that tells nothing may be; none of one that announces its way."""
+
+
+class Offer(msgspec.Struct, frozen=True, kw_only=True):
+    """The best chain that a bidder has found for one stretch of the agent's way."""
+
+    ahead_m: Extent
+    """How far the agent will be on its way."""
+    whole: bool
+    """Whether the last relay sees all of the way until there."""
+    total_cost_m: Extent
+    """What the chain costs, in metres: driving, relays and links."""
+    cost: Extent
+    """Sum of the links' virtual weights."""
+    relays: Annotated[tuple[Placement, ...], msgspec.Meta(max_length=64)]
+    """From the base station outward."""
+    removed: Edge | None = None
+    """The link that it does without; none: the tree is kept."""
+    added: Edge | None = None
+    """The link in its place."""
+
+
+class Bid(Body, frozen=True, kw_only=True, tag="bid"):
+    """The answer to an :class:`Auction`; the same again if that is said again."""
+
+    epoch: Count
+    auction: Count
+    offers: Annotated[tuple[Offer, ...], msgspec.Meta(max_length=64)]
+    """At most one for each stretch and kind of chain; none where the bidder has found no chain."""
+
+
+AnyBody: TypeAlias = (
+    Heartbeat
+    | State
+    | Intent
+    | Goal
+    | GoalReply
+    | Deployment
+    | VoteRequest
+    | Vote
+    | Topology
+    | Confirmation
+    | Auction
+    | Bid
+)
 
 BODIES: dict[str, type[Body]] = {
     body.__struct_config__.tag: body  # type: ignore[misc]
-    for body in (Heartbeat, State, Intent, Goal, GoalReply, Deployment, VoteRequest, Vote)
+    for body in (
+        Heartbeat,
+        State,
+        Intent,
+        Goal,
+        GoalReply,
+        Deployment,
+        VoteRequest,
+        Vote,
+        Topology,
+        Confirmation,
+        Auction,
+        Bid,
+    )
 }
 """Kind → body."""
 
-PERIODIC_KINDS: Final = frozenset({"heartbeat", "state", "intent", "vote_request"})
+PERIODIC_KINDS: Final = frozenset(
+    {"heartbeat", "state", "intent", "vote_request", "topology", "confirmation", "auction", "bid"}
+)
 """Kinds of which only the latest matters: it says all that the ones before said."""
 
 

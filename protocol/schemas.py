@@ -23,8 +23,11 @@ from protocol.messages import (
     BODIES,
     PERIODIC_KINDS,
     AnyBody,
+    Auction,
     Authority,
+    Bid,
     Body,
+    Confirmation,
     Deployment,
     Envelope,
     Goal,
@@ -32,12 +35,19 @@ from protocol.messages import (
     Heartbeat,
     Intent,
     LastHeard,
+    LinkView,
     MemberWay,
+    Milestone,
     Motion,
+    NewLink,
+    Offer,
     Placement,
     Progress,
     Reign,
     State,
+    Topology,
+    Tree,
+    TreeProposal,
     Vote,
     VoteRequest,
     Warrant,
@@ -54,6 +64,13 @@ SPEAKERS: Final = {
     "deployment": ("the leader", "with every decision, and again while it holds"),
     "vote_request": ("who stands for leader, and the leader", "eight times in a lease"),
     "vote": ("every peer", "for each vote request heard"),
+    "topology": ("the leader", "four times a second, and with every change"),
+    "confirmation": (
+        "base station, robots",
+        "once a second, each time that an open proposal is said, and with every change",
+    ),
+    "auction": ("the leader", "before a plan by auction; again until it closes"),
+    "bid": ("base station, robots", "for each auction heard"),
 }
 """Kind → who says it, how often."""
 
@@ -126,6 +143,71 @@ EXAMPLES: Final[tuple[AnyBody, ...]] = (
         granted=True,
         promise=Reign(epoch=3, leader="robot2", incarnation=0),
         mark="1.204",
+    ),
+    Topology(
+        authority=Authority(epoch=3, leader="robot2", sequence=17),
+        warrant=Warrant(lease_s=0.84, marks=(LastHeard(peer="base", mark="0.56"),)),
+        committed=Tree(
+            number=(3, 1),
+            members=("base", "robot1", "agent"),
+            edges=(("base", "robot1"), ("robot1", "agent")),
+            reason="1 relay needed for the agent at (9, 3.5) m",
+        ),
+        proposal=TreeProposal(
+            tree=Tree(
+                number=(3, 2),
+                members=("base", "robot1", "robot2", "agent"),
+                edges=(("base", "robot1"), ("robot1", "robot2"), ("robot2", "agent")),
+                reason="2 relays for the agent 4 m on from (9, 3.5) m",
+            ),
+            links=(
+                NewLink(ends=("robot1", "robot2"), since=Milestone(epoch=3, plan=1, revision=4, stage=12)),
+                NewLink(ends=("robot2", "agent"), since=Milestone(epoch=3, plan=1, revision=4, stage=14)),
+            ),
+            released=(("robot1", "agent"),),
+            method="optimum",
+            round=1,
+        ),
+    ),
+    Confirmation(
+        proposal=(3, 2),
+        views=(LinkView(peer="robot2", verdict="will"),),
+        committed=Tree(
+            number=(3, 1),
+            members=("base", "robot1", "agent"),
+            edges=(("base", "robot1"), ("robot1", "agent")),
+            reason="1 relay needed for the agent at (9, 3.5) m",
+        ),
+    ),
+    Auction(
+        authority=Authority(epoch=3, leader="robot2", sequence=18),
+        warrant=Warrant(lease_s=0.84, marks=(LastHeard(peer="base", mark="0.56"),)),
+        auction=5,
+        closes_in_s=0.25,
+        way=((9.0, 3.5), (9.0, 8.0)),
+        robots=(
+            Placement(robot="robot1", position=(7.0, 3.0)),
+            Placement(robot="robot2", position=(9.0, 2.5)),
+        ),
+        standing=("robot1",),
+    ),
+    Bid(
+        epoch=3,
+        auction=5,
+        offers=(
+            Offer(
+                ahead_m=4.0,
+                whole=True,
+                total_cost_m=14.2,
+                cost=2.1,
+                relays=(
+                    Placement(robot="robot1", position=(7.0, 3.0), cell=118),
+                    Placement(robot="robot2", position=(9.0, 5.0), cell=121),
+                ),
+                removed=("robot1", "agent"),
+                added=("robot1", "robot2"),
+            ),
+        ),
     ),
 )
 
@@ -202,7 +284,7 @@ def _speaker(body: Body) -> str:
             return "agent"
         case Deployment():
             return "base"
-        case VoteRequest():
+        case VoteRequest() | Topology() | Auction():
             return "robot2"
         case _:
             return "robot1"
@@ -238,7 +320,22 @@ def _page() -> str:
     ]
     parts = [
         f"### {part.__name__}\n\n{_plain(inspect.getdoc(part) or '')}\n\n{_field_table(part)}"
-        for part in (Authority, Progress, Motion, MemberWay, Placement, Reign, Warrant, LastHeard)
+        for part in (
+            Authority,
+            Progress,
+            Motion,
+            MemberWay,
+            Placement,
+            Reign,
+            Warrant,
+            LastHeard,
+            Tree,
+            TreeProposal,
+            NewLink,
+            Milestone,
+            LinkView,
+            Offer,
+        )
     ]
     types: list[tuple[str, ...]] = [
         (f"`{name}`", f"`{json.dumps(msgspec.json.schema(getattr(messages, name)))}`".replace("|", "\\|"), meaning)
