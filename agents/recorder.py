@@ -55,7 +55,18 @@ from agents.recorder_columns import (
 from agents.recorder_file import RecordingFile
 from agents.recorder_layout import lay_out_views
 from agents.recorder_style import CELL, ROLE_COLOURS, UNKNOWN, WALL, faded, style
-from agents.records import Advance, AnyRecord, Connectivity, Decision, LogLine, Ordered, Planned, Track, in_words
+from agents.records import (
+    Advance,
+    AnyRecord,
+    Connectivity,
+    Decision,
+    LogLine,
+    Mishap,
+    Ordered,
+    Planned,
+    Track,
+    in_words,
+)
 from agents.tree_layout import lay_out
 from protocol.messages import Motion
 
@@ -172,9 +183,11 @@ class RerunRecorder:
             case Planned():
                 self._gather(now_ns, "planning_ms", scalar_columns, [1e3 * record.planning_s])
                 self._gather(now_ns, "in_sight_s", scalar_columns, [record.in_sight_s])
+            case Mishap():
+                self._log(f"log/{peer}", rr.TextLog(record.text, level=rr.TextLogLevel.WARN))
             case LogLine():
                 self._log(f"log/{peer}", rr.TextLog(f"{peer}: {record.text}", level=_LEVELS[record.level]))
-        self._file.flush(now=isinstance(record, Decision | LogLine))
+        self._file.flush(now=isinstance(record, Decision | LogLine | Mishap))
 
     def close(self) -> None:
         """Finish the file. Safe to call twice, at exit and from a signal's handler on the main thread."""

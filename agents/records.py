@@ -91,4 +91,17 @@ class LogLine(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag
     text: str
 
 
-AnyRecord: TypeAlias = Track | Decision | Ordered | Advance | Planned | Connectivity | LogLine
+class Mishap(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag="mishap"):
+    """Something was done to the team on purpose, to see what it does (:mod:`launcher.chaos`)."""
+
+    kind: str
+    """Of the fault, as in a timetable."""
+    who: tuple[str, ...]
+    """Whose process or links it is."""
+    text: str
+    """What was done, in a few words."""
+    over: bool = False
+    """Whether it is over with this, or begins."""
+
+
+AnyRecord: TypeAlias = Track | Decision | Ordered | Advance | Planned | Connectivity | LogLine | Mishap
