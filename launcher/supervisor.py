@@ -22,6 +22,7 @@ from time import monotonic
 
 from agents.leader import DeploymentPlanner
 from agents.mission import Mission
+from agents.voter_file import VoterFile
 from launcher.processes import fork_peer, spawn, wait_for_end
 from protocol.messages import Point
 
@@ -60,6 +61,8 @@ class Killed:
 
     back_after_s: float | None
     """Until another process is started under the name; None: never."""
+    lose_disk: bool
+    """Whether its voter's file goes with it."""
 
 
 class Supervisor:
@@ -101,17 +104,18 @@ class Supervisor:
         """Restart from now on what crashes. Needs the event loop that :meth:`stop` runs in."""
         self._watchers = [asyncio.create_task(self._watch(peer)) for peer in self.peers.values()]
 
-    def kill(self, name: str, back_after_s: float | None) -> bool:
+    def kill(self, name: str, back_after_s: float | None, *, lose_disk: bool = False) -> bool:
         """Kill a peer's process, whatever it does; False if it has none at the moment.
 
         Args:
             name: of the peer.
             back_after_s: until another one is started under the name; None: never.
+            lose_disk: whether what it has promised as a voter is lost with it.
         """
         peer = self.peers[name]
         if peer.pid is None:
             return False
-        peer.killed = Killed(back_after_s)
+        peer.killed = Killed(back_after_s, lose_disk)
         os.kill(peer.pid, signal.SIGKILL)
         return True
 
@@ -177,6 +181,8 @@ class Supervisor:
                 return
             if (timer := self._paused.pop(peer.name, None)) is not None:
                 timer.cancel()
+            if peer.killed is not None and peer.killed.lose_disk:
+                VoterFile(self._folder, peer.name).path.unlink(missing_ok=True)
             pause_s = self._judge_crash(peer, status) if peer.killed is None else peer.killed.back_after_s
             if pause_s is None:
                 return
@@ -201,4 +207,4 @@ class Supervisor:
             return None
         self._announce(f"{peer.name} {how}; restarting it ({len(peer.crashes)} of {RESTARTS})")
         # The jitter keeps peers that crashed together from coming back together; nothing is reproducible here.
-        return BACKOFF_S * 2 ** (len(peer.crashes) - 1) * (1 + random.random())
+        return BACKOFF_S * 2.0 ** (len(peer.crashes) - 1) * (1.0 + random.random())

@@ -7,8 +7,8 @@ that finds no table loses nothing: there is none unless a launcher on the same m
 
 What this does not emulate: publications are lost whole, after zenoh and the network of the machine have carried them.
 So there is no delay, no backlog that arrives late when the link heals, no fragment lost and sent again by tcp, and no
-new connection to be made. The token of a peer that is cut off goes when zenoh's lease would have run out, and comes back
-at once.
+new connection to be made. The token of a peer that is cut off goes when zenoh's lease would have run out, and comes
+back at once.
 """
 
 from __future__ import annotations
