@@ -15,6 +15,9 @@ from typing import Final
 
 from protocol.messages import Point
 
+BODIES: Final = "bodies"
+"""Name of the file in the folder of a run."""
+
 _PLACE: Final = struct.Struct("<dd")
 
 

@@ -3,7 +3,7 @@
 One thread runs the role: it sleeps until the next message or wake-up, whichever comes first. Computations run in a
 second thread and come back as events. A third waits for the signal to end: it arms a watchdog that needs no Python
 lock, so that even a process whose main thread hangs is gone two seconds later. Should the launcher die, the kernel
-sends that signal.
+kills this process at once.
 
 Little is imported before the peer is tied to its launcher; the rest follows in :func:`live`, or has been imported by
 the launcher of which this process is a fork.
@@ -34,17 +34,21 @@ if TYPE_CHECKING:
     from agents.records import AnyRecord
     from agents.role import Compute, JobDone, Written
     from planning.environment import Environment
+    from protocol.bus import Deliver
     from protocol.inbox import Inbox
 
 CLOSE_WITHIN_S: Final = 2.0
 """From the signal to end until the process is gone, whatever hangs."""
+
+LINGER_S: Final = 0.15
+"""From when a peer listens no more until it leaves: those that end with it shall not take it for lost."""
 
 _PR_SET_PDEATHSIG = 1
 _PR_SET_NAME = 15
 
 
 class Ending:
-    """The wish that this process end: SIGTERM, SIGINT, or the death of the launcher."""
+    """The wish that this process end: SIGTERM or SIGINT."""
 
     def __init__(self) -> None:
         self.wished = threading.Event()
@@ -95,9 +99,12 @@ class Worker:
 
 
 def tie_to(launcher: int) -> None:
-    """Have the kernel end this process with SIGTERM when its launcher dies, or end now if that has happened."""
+    """Have the kernel kill this process when its launcher dies, or end now if that has happened.
+
+    No signal that can wait: to a process that is paused it would never be delivered.
+    """
     libc = ctypes.CDLL(None, use_errno=True)
-    if libc.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0) != 0:
+    if libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0) != 0:
         raise OSError(ctypes.get_errno(), "cannot tie this process to its launcher")
     if os.getppid() != launcher:
         os._exit(1)
@@ -127,6 +134,7 @@ def live(
         ending: says when it is time.
         planner: of the team, if there is one already.
     """
+    from agents.body_places import BODIES, BodyPlaces
     from agents.casting import Casting
     from agents.records import LogLine
     from agents.role import JobDone, Written
@@ -134,6 +142,7 @@ def live(
     from agents.voter_file import VoterFile
     from planning.environment import Environment
     from protocol.inbox import Inbox
+    from protocol.link_faults import LINKS, LinkFilter, LinkTable
     from protocol.zenoh_bus import ZenohBus
 
     epoch_s = time.clock_gettime(time.CLOCK_BOOTTIME) - (time.time() - mission.epoch_unix_s)
@@ -160,7 +169,12 @@ def live(
     voter_file.serve(inbox.put)
     ending.wakes(inbox)
     endpoints = [entry.endpoint for entry in mission.roster]
-    bus = ZenohBus.open(mission.team, name, mission.entry(name).endpoint, endpoints, inbox.put)
+    peers = [entry.name for entry in mission.roster]
+    bodies = BodyPlaces(folder / BODIES, peers) if (folder / BODIES).exists() else None
+    deliver: Deliver = inbox.put
+    if (folder / LINKS).exists():
+        deliver = LinkFilter(LinkTable(folder / LINKS, peers), name, inbox.put, mission.seed).deliver
+    bus = ZenohBus.open(mission.team, name, mission.entry(name).endpoint, endpoints, deliver)
     try:
         shell = PeerShell(
             role,
@@ -169,7 +183,7 @@ def live(
             name=name,
             team=mission.team,
             incarnation=incarnation,
-            peers=[entry.name for entry in mission.roster],
+            peers=peers,
             now=now,
             wall_clock=time.time,
             record=record,
@@ -179,6 +193,8 @@ def live(
         shell.start()
         while not ending.wished.is_set():
             for event in inbox.wait(shell.wake_at_s - now()):
+                if ending.wished.is_set():
+                    break
                 if isinstance(event, JobDone):
                     shell.finish(event)
                 elif isinstance(event, Written):
@@ -187,6 +203,9 @@ def live(
                     shell.take(event)
             if now() >= shell.wake_at_s:
                 shell.wake()
+                if bodies is not None:
+                    bodies.put(name, driver.pose())
+        time.sleep(LINGER_S)
     finally:
         bus.close()
         recorder.close()

@@ -24,6 +24,9 @@ from typing import Final
 from protocol import keys
 from protocol.bus import BusEvent, Deliver, PeerAppeared, PeerVanished, Received
 
+LINKS: Final = "links"
+"""Name of the file in the folder of a run."""
+
 CUT: Final = 100
 """Per cent: nothing passes."""
 
