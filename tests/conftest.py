@@ -1,6 +1,7 @@
 """Before the first test: kernels are compiled, so that no test pays for it or runs a stale one; examples are seeded.
 
-Compiled maps are kept in a folder of the session's own: nothing of the user's is read or written.
+Compiled maps are kept in a folder of the session's own, which its processes share: nothing of the user's is read or
+written.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ settings.load_profile("sightline")
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    if hasattr(config, "workerinput"):  # one of several processes of the session, which inherits the folder
+        return
     folder = tempfile.TemporaryDirectory(prefix="sightline-maps-")
     os.environ["SIGHTLINE_CACHE"] = folder.name
     config.add_cleanup(folder.cleanup)
