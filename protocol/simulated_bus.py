@@ -2,13 +2,11 @@
 
 :class:`VirtualTime` is the clock: it jumps to the next thing that is due, so that minutes of protocol take
 milliseconds. :class:`SimulatedNetwork` carries publications between the peers attached to it, each with a delay drawn
-from the seed, and loses some. The same seed and the same calls give the same history, to the last bit, on every machine
-and under every ``PYTHONHASHSEED``.
+from the seed, and has all go wrong that is asked for. The same seed and the same calls give the same history, to the
+last bit, under every ``PYTHONHASHSEED``, and on every machine as far as its logarithms round alike.
 
-Like a zenoh session over tcp, a link keeps the order of what it carries, and tokens are not lost. Each kind of chance
-draws from a stream of its own, so that more loss does not change the delays of what arrives. The other faults
-(duplicates, reordering, partitions, crashes, pauses, clock skew) each have one place to go to:
-:meth:`SimulatedNetwork._send` for links, :meth:`SimulatedNetwork.attach` for peers.
+Like a zenoh session over tcp, a sound link keeps the order of what it carries, and tokens are not lost. What can be
+wrong with links says :mod:`protocol.simulated_links`; what can be wrong with peers is for whoever attaches them.
 
 Models: trio's MockClock; FoundationDB's simulation testing.
 """
@@ -18,10 +16,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection
 from heapq import heappop, heappush
-from random import Random
 from typing import Any
 
 from protocol.bus import BusEvent, Deliver, PeerAppeared, PeerVanished, Received
+from protocol.simulated_links import SOUND, Delays, Link, LinkFaults
 
 
 class VirtualTime:
@@ -63,9 +61,17 @@ class SimulatedBus:
     """The connection of one peer (or one operator) to a simulated network. Made by :meth:`SimulatedNetwork.attach`."""
 
     def __init__(
-        self, network: SimulatedNetwork, peer: str, deliver: Deliver, operator: bool, kinds: Collection[str] | None
+        self,
+        network: SimulatedNetwork,
+        peer: str,
+        number: int,
+        deliver: Deliver,
+        operator: bool,
+        kinds: Collection[str] | None,
     ) -> None:
         self.peer = peer
+        self.number = number
+        """Of the attachment: those that come later have greater ones."""
         self.operator = operator
         self.kinds = None if kinds is None else frozenset(kinds)
         self.dropped = 0
@@ -81,11 +87,15 @@ class SimulatedBus:
         else:
             self.dropped += 1
 
-    def close(self) -> None:
-        """Leave: nothing is delivered here any more, and the others see the peer vanish. Closing again does nothing."""
+    def close(self, noticed_after_s: float = 0.0) -> None:
+        """Leave: nothing is delivered here any more, and the others see the peer vanish. Closing again does nothing.
+
+        Args:
+            noticed_after_s: the token goes so much later, unless the peer has come back by then.
+        """
         if self._open:
             self._open = False
-            self._network._detach(self)
+            self._network._detach(self, noticed_after_s)
 
     def _arrive(self, event: BusEvent) -> None:
         if self._open:
@@ -98,7 +108,7 @@ class SimulatedNetwork:
     Args:
         time: the clock that deliveries are put on.
         seed: of all that is left to chance here.
-        delay_s: least and greatest delay of a message; drawn uniformly for each message and receiver.
+        delay_s: least and greatest delay of a message on a sound link; drawn uniformly for each message and receiver.
         loss: probability that a receiver misses a publication.
 
     Raises:
@@ -115,16 +125,18 @@ class SimulatedNetwork:
         self.published = 0
         """Publications so far."""
         self.delivered = 0
-        """Publications that were put on a link, counted once for each receiver."""
+        """Publications that were put on a link, counted once for each time that one arrives."""
         self.lost = 0
-        """Publications that chance took, counted once for each receiver."""
+        """Publications that chance or a cut took, counted once for each receiver."""
         self._time = time
-        self._least_s, self._greatest_s = delay_s
-        self._loss = loss
-        self._delays = Random(f"{seed}/delay")
-        self._losses = Random(f"{seed}/loss")
+        self._seed = seed
+        self._delays = Delays(delay_s[0], 0.5 * (delay_s[1] - delay_s[0]))
+        self._usual = LinkFaults(loss=loss) if loss else SOUND
+        self._attachments = 0
         self._attached: dict[str, SimulatedBus] = {}
-        self._last_arrivals_s: dict[tuple[str, str], float] = {}
+        self._links: dict[tuple[str, str], Link] = {}
+        self._routes: dict[tuple[str, str], list[tuple[Link, SimulatedBus]]] = {}
+        """By speaker and kind; of those that are attached now."""
 
     def attach(
         self, peer: str, deliver: Deliver, *, operator: bool = False, kinds: Collection[str] | None = None
@@ -143,40 +155,88 @@ class SimulatedNetwork:
         name = f"operator/{peer}" if operator else peer
         if name in self._attached:
             raise ValueError(f"{name} is attached to the simulated network already: close its bus first")
-        bus = SimulatedBus(self, name, deliver, operator, kinds)
-        for other_name, other in self._attached.items():
-            if not operator:
-                self._send(name, other, PeerAppeared(name))
-            if not other.operator:
-                self._send(other_name, bus, PeerAppeared(other_name))
+        self._attachments += 1
+        bus = SimulatedBus(self, name, self._attachments, deliver, operator, kinds)
+        others = tuple(self._attached.values())
         self._attached[name] = bus
+        self._routes.clear()
+        for other in others:
+            self._show_token(name, other)
+            self._link(other.peer, name).token = 0  # a process that begins has seen nobody
+            self._show_token(other.peer, bus)
         return bus
 
-    def _detach(self, bus: SimulatedBus) -> None:
+    def set_faults(self, speaker: str, hearer: str, faults: LinkFaults | None) -> None:
+        """What is wrong with the link from one peer to another from now on; None: no more than everywhere.
+
+        Tokens that went or came while it was cut are seen to have done so as soon as it is not.
+        """
+        link = self._link(speaker, hearer)
+        link.faults = self._usual if faults is None else faults
+        if hearer in self._attached:
+            self._show_token(speaker, self._attached[hearer])
+
+    def hide_token(self, speaker: str, hearer: str) -> None:
+        """Let a peer see the token of another vanish now, which it cannot reach, if the link is cut."""
+        link, bus = self._link(speaker, hearer), self._attached.get(hearer)
+        if link.faults.cut and link.token and bus is not None:
+            link.token = 0
+            self._send(link, bus, PeerVanished(speaker))
+
+    def _detach(self, bus: SimulatedBus, noticed_after_s: float) -> None:
         del self._attached[bus.peer]
-        if not bus.operator:
-            for other in self._attached.values():
-                self._send(bus.peer, other, PeerVanished(bus.peer))
+        self._routes.clear()
+        if noticed_after_s > 0.0:
+            self._time.call_at(self._time.now_s + noticed_after_s, self._show_tokens, bus.peer)
+        else:
+            self._show_tokens(bus.peer)
+
+    def _show_tokens(self, speaker: str) -> None:
+        for other in tuple(self._attached.values()):
+            if other.peer != speaker:
+                self._show_token(speaker, other)
+
+    def _show_token(self, speaker: str, hearer: SimulatedBus) -> None:
+        """Bring up to date what a hearer sees of a peer's token, if anything passes."""
+        link, bus = self._link(speaker, hearer.peer), self._attached.get(speaker)
+        number = 0 if bus is None or bus.operator else bus.number
+        if number == link.token or link.faults.cut:
+            return
+        if link.token:
+            self._send(link, hearer, PeerVanished(speaker))
+        if number:
+            self._send(link, hearer, PeerAppeared(speaker))
+        link.token = number
 
     def _publish(self, sender: SimulatedBus, publication: Received) -> None:
         self.published += 1
         kind = publication.key.rpartition("/")[2]
-        for other in self._attached.values():
-            if other is sender or (other.kinds is not None and kind not in other.kinds):
-                continue
-            if self._loss and self._losses.random() < self._loss:
-                self.lost += 1
-                self._draw_delay_s()
-            else:
+        routes = self._routes.get((sender.peer, kind))
+        if routes is None:
+            routes = self._routes[sender.peer, kind] = [
+                (self._link(sender.peer, other.peer), other)
+                for other in self._attached.values()
+                if other is not sender and (other.kinds is None or kind in other.kinds)
+            ]
+        now_s, call_at = self._time.now_s, self._time.call_at
+        for link, other in routes:
+            if link.faults is SOUND:
                 self.delivered += 1
-                self._send(sender.peer, other, publication)
+                call_at(link.carry(now_s), other._arrive, publication)
+                continue
+            arrivals = list(link.carry_badly(publication, now_s))
+            self.lost += not arrivals
+            self.delivered += len(arrivals)
+            for arrival_s, arriving in arrivals:
+                call_at(arrival_s, other._arrive, arriving)
 
-    def _send(self, sender: str, receiver: SimulatedBus, event: BusEvent) -> None:
-        """Put one event on one link, behind what is on its way there."""
-        link = (sender, receiver.peer)
-        arrival_s = max(self._time.now_s + self._draw_delay_s(), self._last_arrivals_s.get(link, 0.0))
-        self._last_arrivals_s[link] = arrival_s
-        self._time.call_at(arrival_s, receiver._arrive, event)
+    def _send(self, link: Link, receiver: SimulatedBus, event: BusEvent) -> None:
+        """Put a token on a link, behind what is on its way there."""
+        self._time.call_at(link.carry(self._time.now_s), receiver._arrive, event)
 
-    def _draw_delay_s(self) -> float:
-        return self._least_s + (self._greatest_s - self._least_s) * self._delays.random()
+    def _link(self, speaker: str, hearer: str) -> Link:
+        link = self._links.get((speaker, hearer))
+        if link is None:
+            link = self._links[speaker, hearer] = Link(f"{self._seed}/{speaker}/{hearer}", self._delays)
+            link.faults = self._usual
+        return link
