@@ -11,6 +11,7 @@ from typing import Literal, TypeAlias
 import msgspec
 
 from protocol.messages import Name, Point, RoleName
+from protocol.roster import Roster
 
 
 class RosterEntry(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -106,6 +107,16 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
             if entry.name == name:
                 return entry
         raise KeyError(name)
+
+    @property
+    def voters(self) -> Roster:
+        """The team as the election sees it: base station and robots vote, in this order.
+
+        Raises:
+            RosterFault: the roster is none that a team can have.
+        """
+        voters = (self.base_station.name, *(robot.name for robot in self.robots))
+        return Roster(voters, (self.tracked_agent.name,))
 
     @property
     def base_station(self) -> RosterEntry:

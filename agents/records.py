@@ -10,7 +10,7 @@ from typing import Literal, TypeAlias
 
 import msgspec
 
-from protocol.messages import Deployment, Mode, Motion, Point, RoleName
+from protocol.messages import Deployment, Mode, Motion, Point, Reign, RoleName
 
 
 class Track(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag="track"):
@@ -84,6 +84,21 @@ class Connectivity(msgspec.Struct, frozen=True, kw_only=True, tag_field="record"
     either order of the ends) are out of sight at the moment."""
 
 
+class Office(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag="office"):
+    """Who leads and who is obeyed, as the recording peer believes; with every change."""
+
+    standing: str
+    """Where it stands in the election (:class:`protocol.election_states.Standing`)."""
+    leads: Reign | None
+    """The reign that it leads in itself."""
+    obeys: Reign | None
+    """Whose orders are in force for it; none: it holds."""
+    led_until_s: float | None = None
+    """When the reign ended that it led in before; earlier than this record if it hung then."""
+    obeyed_until_s: float | None = None
+    """When it ceased to obey the one that it obeyed before, likewise."""
+
+
 class LogLine(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag="log"):
     """A sentence for the reviewer."""
 
@@ -104,4 +119,4 @@ class Mishap(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag=
     """Whether it is over with this, or begins."""
 
 
-AnyRecord: TypeAlias = Track | Decision | Ordered | Advance | Planned | Connectivity | LogLine | Mishap
+AnyRecord: TypeAlias = Track | Decision | Ordered | Advance | Planned | Connectivity | Office | LogLine | Mishap

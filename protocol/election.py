@@ -89,6 +89,8 @@ class Election:
         self._voter = Voter(promise, LEASE_S, now_s)
         self.obedience = Obedience(name, incarnation, LEASE_S, self._voter if votes else None)
         """Judges orders, one's own too."""
+        self.lease_until_s = -math.inf
+        """When its lease ends; minus infinity while it holds none."""
         self._roster = roster
         self._team = team
         self._name = name
@@ -103,7 +105,7 @@ class Election:
         """Candidate and correlation of the request whose promise is being written."""
         self._withdrawn_epoch = -1
         self._outdated = self._failing = False
-        self._lease_until_s = self._leader_heard_s = -math.inf
+        self._leader_heard_s = -math.inf
         self._waiting_since_s = self._patience_s = self._candidate_until_s = self._next_round_s = math.inf
         self._effects: list[Effect] = []
 
@@ -127,7 +129,7 @@ class Election:
 
     def leads(self, now_s: float) -> bool:
         """Whether it holds an unexpired lease."""
-        return self.office is not None and now_s < self._lease_until_s
+        return self.office is not None and now_s < self.lease_until_s
 
     def warrant(self, now_s: float) -> Warrant | None:
         """What goes with an order given now; None: no order may be given."""
@@ -135,7 +137,7 @@ class Election:
             return None
         marks = {**self._marks, self._name: self.obedience.mark(now_s)}
         heard = tuple(LastHeard(peer=peer, mark=mark) for peer, mark in marks.items())
-        return Warrant(lease_s=self._lease_until_s - now_s, marks=heard)
+        return Warrant(lease_s=self.lease_until_s - now_s, marks=heard)
 
     def _answer(self, reign: Reign, request: VoteRequest, now_s: float) -> None:
         """Vote on a request, or say why not; heed a leader."""
@@ -201,7 +203,7 @@ class Election:
         ballot = self._ballot
         assert ballot is not None
         if ballot.reign == self.office:
-            self._lease_until_s = max(self._lease_until_s, ballot.held_until_s)
+            self.lease_until_s = max(self.lease_until_s, ballot.held_until_s)
         elif ballot.wants_only(self._name, now_s):
             if self._voter.renew(ballot.reign, now_s):
                 ballot.count_from(self._name, now_s)
@@ -210,7 +212,7 @@ class Election:
                 self._write(ballot.reign, now_s)
         elif ballot.is_cast_by(self._name) and now_s < ballot.held_until_s:
             self.office = ballot.reign
-            self._lease_until_s = max(self._lease_until_s, ballot.held_until_s)
+            self.lease_until_s = max(self.lease_until_s, ballot.held_until_s)
             self._next_round_s = now_s
             self._effects.append(Leads(ballot.reign))
             self._go(Occurrence.ELECTED, now_s)
@@ -256,7 +258,7 @@ class Election:
         elif self.standing is Standing.CANDIDATE and now_s >= self._candidate_until_s:
             self._withdraw(now_s)
             self._go(Occurrence.NOT_ELECTED, now_s)
-        elif self.standing is Standing.LEADING and now_s >= self._lease_until_s:
+        elif self.standing is Standing.LEADING and now_s >= self.lease_until_s:
             self._leave_office("no majority has renewed its lease")
             self._go(Occurrence.LEASE_ENDED, now_s)
         if self.standing is Standing.WAITING and self._voter.is_free(now_s) and now_s >= self._stands_at_s:
@@ -329,7 +331,7 @@ class Election:
 
     def _leave_office(self, reason: str) -> None:
         self.office = self._ballot = None
-        self._lease_until_s = -math.inf
+        self.lease_until_s = -math.inf
         self._effects.append(LeadsNoMore(reason))
 
     def _say_vote(self, candidate: str, correlation: str, granted: bool, now_s: float) -> None:
@@ -367,7 +369,7 @@ class Election:
             case Standing.CANDIDATE:
                 return min(wake_s, self._candidate_until_s, self._next_round_s)
             case Standing.LEADING:
-                return min(wake_s, self._lease_until_s, self._next_round_s)
+                return min(wake_s, self.lease_until_s, self._next_round_s)
         return wake_s
 
     def _reign(self, epoch: int) -> Reign:

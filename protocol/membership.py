@@ -119,6 +119,11 @@ class Membership:
         known = self._known.get(peer)
         return known.presence if known is not None else Presence.UNKNOWN
 
+    def incarnation(self, peer: str) -> int:
+        """The latest one heard of a peer; -1 before anything is, and for one that is not on the roster."""
+        known = self._known.get(peer)
+        return known.incarnation if known is not None else -1
+
     @property
     def present(self) -> tuple[str, ...]:
         """Who is there, in the order of the roster, this peer included."""
