@@ -166,7 +166,7 @@ def read_timetable(path: Path, peers: Collection[str]) -> Timetable:
     """
     try:
         raw = tomllib.loads(path.read_text(encoding="utf-8"))
-        return checked(msgspec.convert(raw, Timetable), peers)
+        return checked(timetable_of(raw), peers)
     except OSError as problem:
         raise FaultyTimetable(f"{path}: cannot be read ({problem.strerror}); give the path of a TOML file") from problem
     except UnicodeDecodeError as problem:
@@ -174,14 +174,24 @@ def read_timetable(path: Path, peers: Collection[str]) -> Timetable:
     except tomllib.TOMLDecodeError as problem:
         said = str(problem)
         raise FaultyTimetable(f"{path}: is not valid TOML, {said[:1].lower()}{said[1:]}; mend that line") from problem
-    except msgspec.ValidationError as problem:
-        raise FaultyTimetable(f"{path}: {_explain(str(problem), raw)}") from problem
     except RecursionError as problem:
         raise FaultyTimetable(f"{path}: is nested too deeply; a list of names is the deepest there is") from problem
     except FaultyTimetable as problem:
         raise FaultyTimetable(f"{path}: {problem}") from problem
     except ValueError as problem:  # the interpreter reads whole numbers of at most 4300 digits
         raise FaultyTimetable(f"{path}: holds a number of thousands of digits; give seconds and shares") from problem
+
+
+def timetable_of(raw: dict[str, Any]) -> Timetable:
+    """Timetable of a decoded file.
+
+    Raises:
+        FaultyTimetable: it does not fit.
+    """
+    try:
+        return msgspec.convert(raw, Timetable)
+    except msgspec.ValidationError as problem:
+        raise FaultyTimetable(_explain(str(problem), raw)) from problem
 
 
 def checked(timetable: Timetable, peers: Collection[str]) -> Timetable:

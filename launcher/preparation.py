@@ -16,6 +16,7 @@ from agents.leader import MOST_TO_PLAN_ON, DeploymentPlanner, remedy_for
 from agents.mission import Behaviour, Mission, OnDemand, Ranging, RosterEntry, Scripted, Wandering
 from agents.movement_authority import Onset
 from agents.planning_job import Question
+from launcher.fault_timetable import FaultyTimetable, Timetable, checked
 from launcher.ground import Ground, named
 from launcher.kernels import warm_up
 from launcher.scenario import Scenario, ScenarioFault, find_map, read_scenario
@@ -78,6 +79,7 @@ def prepare(file: Path, announce: Callable[[str], None]) -> Preparation:
     robot_discs = [(place, start, robots.radius_m) for place, start in named("robots.starts", starts).items()]
     ground.check_apart([("agent.start", agent.start, agent.radius_m), *robot_discs])
     mission = _mission(scenario, starts)
+    _check_faults(file, scenario, mission)
     if len(environment.vertices) > LARGE:
         announce(f"Preparing the planner for a map of {len(environment.vertices)} vertices ...")
     if mission.placements == "cells":
@@ -92,6 +94,14 @@ def prepare(file: Path, announce: Callable[[str], None]) -> Preparation:
     _rehearse(file, mission, casting)
     warnings = (*_check_robots_suffice(file, scenario, planner), *_check_pace(scenario))
     return Preparation(scenario, environment, mission, planner, warnings)
+
+
+def _check_faults(file: Path, scenario: Scenario, mission: Mission) -> None:
+    """Raise where a fault names somebody who is not there, or pauses a peer for ever."""
+    try:
+        checked(Timetable(faults=scenario.faults), [entry.name for entry in mission.roster])
+    except FaultyTimetable as problem:
+        raise ScenarioFault(f"{file}: {problem}") from problem
 
 
 def _rehearse(file: Path, mission: Mission, casting: Casting) -> None:

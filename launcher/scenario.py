@@ -20,6 +20,7 @@ import msgspec
 from msgspec import Meta
 
 import maps
+from launcher.fault_timetable import Fault, FaultyTimetable, timetable_of
 from launcher.wording import counted
 from protocol.keys import is_name
 from protocol.messages import Point
@@ -137,6 +138,8 @@ class Scenario(_Table, frozen=True, kw_only=True):
     planning: Planning = Planning()
     ranging: Ranging = Ranging()
     network: Network = Network()
+    faults: tuple[Fault, ...] = ()
+    """``[[faults]]``: what goes wrong on purpose, as in a timetable (:mod:`launcher.fault_timetable`)."""
 
     @property
     def robot_count(self) -> int:
@@ -222,6 +225,7 @@ def read_scenario(path: Path) -> Scenario:
         for place, number in _numbers(raw, ""):
             if not math.isfinite(number):
                 raise ScenarioFault(f"{path}: {place} is {number}; give a finite number")
+        timetable_of({"faults": raw.get("faults", [])})  # says what is wrong with a fault
         scenario = msgspec.convert(raw, Scenario)
     except OSError as problem:
         raise ScenarioFault(f"{path}: cannot be read ({problem.strerror}); give the path of a TOML file") from problem
@@ -234,6 +238,8 @@ def read_scenario(path: Path) -> Scenario:
         raise ScenarioFault(f"{path}: {_explain(str(problem))}") from problem
     except RecursionError as problem:
         raise ScenarioFault(f"{path}: is nested too deeply; a place is [x, y], and nothing is deeper") from problem
+    except FaultyTimetable as problem:
+        raise ScenarioFault(f"{path}: {problem}") from problem
     except ScenarioFault:
         raise
     except ValueError as problem:  # the interpreter reads whole numbers of at most 4300 digits
