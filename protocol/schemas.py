@@ -28,10 +28,12 @@ from protocol.messages import (
     Bid,
     Body,
     Confirmation,
+    ConvexPiece,
     Deployment,
     Envelope,
     Goal,
     GoalReply,
+    HeardRanges,
     Heartbeat,
     Intent,
     LastHeard,
@@ -43,7 +45,14 @@ from protocol.messages import (
     Offer,
     Placement,
     Progress,
+    RangeBase,
+    RangeDigest,
+    RangeReply,
+    RangeRequest,
+    Ranges,
     Reign,
+    Ring,
+    SharedRange,
     State,
     Topology,
     Tree,
@@ -71,6 +80,11 @@ SPEAKERS: Final = {
     ),
     "auction": ("the leader", "before a plan by auction; again until it closes"),
     "bid": ("base station, robots", "for each auction heard"),
+    "range_request": ("base station, robots", "at `ranging.rate_hz`, if the agent is independent"),
+    "range_reply": ("an independent tracked agent", "for each request from in line of sight"),
+    "ranges": ("base station, robots", "with each range measured, and for who lacks some"),
+    "range_digest": ("base station, robots", "once a second"),
+    "range_base": ("base station, robots", "for who lacks ranges that nobody keeps any more"),
 }
 """Kind → who says it, how often."""
 
@@ -209,6 +223,34 @@ EXAMPLES: Final[tuple[AnyBody, ...]] = (
             ),
         ),
     ),
+    RangeRequest(position=(4.0, 2.5), correlation="17.204"),
+    RangeReply(asker="robot1", correlation="17.204", range_m=5.13, bound_m=0.2),
+    Ranges(
+        ranges=(
+            SharedRange(
+                owner="robot1", start=0, number=204, time_s=51.25, anchor=(4.0, 2.5), range_m=5.13, bound_m=0.204
+            ),
+        )
+    ),
+    RangeDigest(
+        clock_s=51.5,
+        heard=(
+            HeardRanges(owner="base", start=0, below=207),
+            HeardRanges(owner="robot1", start=0, below=203, beyond=(204,)),
+        ),
+    ),
+    RangeBase(
+        time_s=48.75,
+        owner="robot1",
+        start=0,
+        number=194,
+        heard=(HeardRanges(owner="base", start=0, below=196), HeardRanges(owner="robot1", start=0, below=195)),
+        fingerprint=3141592653,
+        origin=(1.5, 1.0),
+        pieces=(ConvexPiece(corners=((7.1, 2.2), (7.4, 2.1), (7.5, 2.9)), checked_m=0.31),),
+        rings=(Ring(center=(2.5, 1.5), inner_m=4.93, outer_m=5.33),),
+        rejections=0,
+    ),
 )
 
 PAGE: Final = """\
@@ -280,7 +322,7 @@ def _speaker(body: Body) -> str:
     match body:
         case Goal():
             return "ada"
-        case Intent() | GoalReply():
+        case Intent() | GoalReply() | RangeReply():
             return "agent"
         case Deployment():
             return "base"
@@ -335,6 +377,10 @@ def _page() -> str:
             Milestone,
             LinkView,
             Offer,
+            SharedRange,
+            HeardRanges,
+            ConvexPiece,
+            Ring,
         )
     ]
     types: list[tuple[str, ...]] = [
