@@ -76,11 +76,15 @@ class Casting:
     def team_planner(self) -> TeamPlanner:
         """What the leader plans with. Raises as :meth:`planner`."""
         from agents.motion_planner import MotionPlanner
+        from agents.roaming import Roaming
         from agents.team_planner import TeamPlanner
 
-        deployments = self.planner()
-        motions = MotionPlanner(self._mission, self._environment, deployments.graph, self._judge)
-        return TeamPlanner(self._environment, deployments, motions, self._mission.agent_speed_m_s)
+        mission, deployments = self._mission, self.planner()
+        motions = MotionPlanner(mission, self._environment, deployments.graph, self._judge)
+        speed_m_s, agent = mission.agent_speed_m_s, mission.tracked_agent
+        space = self._space(mission.agent_radius_m, agent.start)
+        roaming = None if mission.announces else Roaming(space.geodesics, speed_m_s)
+        return TeamPlanner(self._environment, deployments, motions, speed_m_s, roaming)
 
     def _build_planner(self) -> DeploymentPlanner:
         from agents.leader import DeploymentPlanner  # its imports take a quarter of a second, and one peer needs them

@@ -2,12 +2,11 @@
 
 Relays stand at placements that see each other (thesis §3.3; :mod:`planning.placement_graph`). The thesis plans a chain
 for where the agent is; by the time that the robots stand there the agent is elsewhere, and while they drive the chain
-is broken. So this planner makes several proposals, follows each of them in thought along the announced path of the
-agent, and takes the one under which the chain holds longest:
+is broken. So this planner makes several proposals, follows each of them in thought along the ways that the agent may
+take (:mod:`agents.whereabouts`), and takes the one under which the chain holds longest:
 
 - the relays stay where they were sent before,
-- the cheapest chain (:mod:`agents.proposals`) for where the agent is now, and for where it will be some metres farther
-  on its path; the last relay is to see the whole piece, if any placement does.
+- the cheapest chain (:mod:`agents.proposals`) for where the agent may be now, and for where it may be some metres on.
 
 Robots that are no relays are spares: they follow the agent at a distance, so that at the next corner the chain grows
 by the robot that is there already.
@@ -24,13 +23,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.outlook import Outlook
-from agents.proposals import PREVIEWS_M, Proposal, Proposer, name_place, relays_in_words
+from agents.proposals import Proposal, Proposer, relays_in_words
 from agents.spares import Waiting
+from agents.whereabouts import Whereabouts, name_place
 from planning.compiled_map import CompiledMap
 from planning.decomposition import Kind
 from planning.deployment import NO_CHAIN, NoChain
 from planning.environment import Environment
-from planning.foresight import walk
 from planning.mutual_visibility import TooManyCells
 from planning.redeployment import Search
 from protocol.messages import Placement, Point
@@ -130,11 +129,9 @@ class DeploymentPlanner:
         Raises:
             NoChain: the point is outside the map, or no chain reaches it.
         """
-        if not self._environment.contains([point])[0]:
-            raise NoChain(f"{name_place(point)} is outside the map")
         needed = int(self._proposer.relays_needed([point])[0])
-        if needed == NO_CHAIN:
-            raise NoChain(f"no chain of relays with a radius of {self.graph.radius_m:g} m reaches {name_place(point)}")
+        if needed == NO_CHAIN or not self._environment.contains([point])[0]:
+            raise NoChain(self._unreachable(point))
         return needed
 
     def most_relays_needed(self) -> int:
@@ -143,8 +140,7 @@ class DeploymentPlanner:
 
     def plan(
         self,
-        agent: Point,
-        agent_path: Sequence[Point],
+        agent: Whereabouts,
         robots: Mapping[str, Point],
         previous: Plan | None,
         obstacles: Sequence[Point] = (),
@@ -152,8 +148,7 @@ class DeploymentPlanner:
         """Decide where every robot goes.
 
         Args:
-            agent: where the agent is, metres, map frame.
-            agent_path: what is left of its way, from where it is on; empty if it stands or says nothing.
+            agent: where the agent may be, and go.
             robots: where the robots are that can be counted on.
             previous: the plan before.
             obstacles: where robots may stand that cannot be counted on.
@@ -161,42 +156,46 @@ class DeploymentPlanner:
         Returns:
             A plan that gives each of ``robots`` exactly one place.
 
-        Complexity: O(k N²) for each preview, k robots and N cells; then O(s k² w) for s steps and w walls.
+        Complexity: O(k N²) for each aim, k robots and N cells; then O(p s k² w) for s steps on p ways and w walls.
         """
-        try:
-            needed = self.relays_needed(agent)
-        except NoChain as problem:
+        now = agent.aims[0]
+        needed = self._proposer.relays_for(now)
+        if needed == NO_CHAIN:
             waiting = tuple(Placement(robot=name, position=place, spare=True) for name, place in robots.items())
-            return Plan(waiting, (), 0.0, 0, False, f"{problem}: everybody waits")
-        way = np.array([agent, *agent_path], dtype=np.float64)
+            return Plan(waiting, (), 0.0, 0, False, f"{self._unreachable(agent.center)}: everybody waits")
         robots = {name: self._inside(place) for name, place in robots.items()}
         relays = () if previous is None else tuple(place for place in previous.placements if not place.spare)
-        standing = self._standing(way, robots, relays, previous)
+        standing = self._standing(agent, robots, relays, previous)
         names = [relay.robot for relay in relays if relay.robot in robots]
-        new = self._proposer.chains(way, robots, names, obstacles) or [self._proposer.outward(agent, robots, obstacles)]
-        chosen = self._best(standing, new, way, robots)
-        return self._complete(chosen, way, robots, needed, previous, obstacles)
+        new = self._proposer.chains(agent, robots, names, obstacles)
+        chosen = self._best(standing, new or [self._proposer.outward(now, robots, obstacles)], agent, robots)
+        return self._complete(chosen, agent.center, robots, needed, previous, obstacles)
+
+    def _unreachable(self, point: Point) -> str:
+        """Why no chain leads there; a sentence."""
+        if not self._environment.contains([point])[0]:
+            return f"{name_place(point)} is outside the map"
+        return f"no chain of relays with a radius of {self.graph.radius_m:g} m reaches {name_place(point)}"
 
     def _standing(
-        self, way: Floats, robots: Mapping[str, Point], relays: tuple[Placement, ...], previous: Plan | None
+        self, agent: Whereabouts, robots: Mapping[str, Point], relays: tuple[Placement, ...], previous: Plan | None
     ) -> Proposal | None:
         """The chain of the previous plan, if it was one and all its relays are still there."""
         if previous is None or not previous.serves or any(relay.robot not in robots for relay in relays):
             return None
         last = relays[-1].position if relays else self._base
-        ahead = walk(way, np.linspace(0.0, PREVIEWS_M[-1], 33))
-        serves = bool(np.any(self._environment.line_of_sight(np.array(last), ahead)))
+        serves = any(np.any(self._environment.line_of_sight(np.array(last), aim.places)) for aim in agent.aims)
         reason = previous.reason
         if not serves:
-            reason = f"{relays_in_words(len(relays))} kept, seeing nothing of the agent's way"
+            reason = f"{relays_in_words(len(relays))} kept, seeing nothing of where the agent may be and go"
         return Proposal(relays, serves, reason, previous.cost, previous.total_cost_m, previous.lower_bound_m)
 
     def _best(
-        self, standing: Proposal | None, new: list[Proposal], way: Floats, robots: Mapping[str, Point]
+        self, standing: Proposal | None, new: list[Proposal], agent: Whereabouts, robots: Mapping[str, Point]
     ) -> Proposal:
         """The proposal that is worth most, the standing chain when in doubt."""
         outlook = Outlook(
-            self._environment, self._geodesics, self._base, way, robots,
+            self._environment, self._geodesics, self._base, agent, robots,
             agent_speed_m_s=self._agent_speed_m_s, robot_speed_m_s=self._robot_speed_m_s,
             distance_m=self._waiting.pitch_m,
         )  # fmt: skip
@@ -210,7 +209,7 @@ class DeploymentPlanner:
     def _complete(
         self,
         chosen: Proposal,
-        way: Floats,
+        agent: Point,
         robots: Mapping[str, Point],
         needed: int,
         previous: Plan | None,
@@ -224,7 +223,7 @@ class DeploymentPlanner:
             {} if previous is None else {place.robot: place.position for place in previous.placements if place.spare}
         )
         chain = [self._base, *(relay.position for relay in relays)]
-        waiting = self._waiting.places(self._inside(way[0]), chain, spares, before, obstacles)
+        waiting = self._waiting.places(self._inside(agent), chain, spares, before, obstacles)
         placements = tuple(Placement(robot=name, position=place, spare=True) for name, place in waiting.items())
         return Plan(
             (*relays, *placements), tuple(pairwise(names)), chosen.cost, needed, chosen.complete, chosen.reason,

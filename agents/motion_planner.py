@@ -1,13 +1,13 @@
 """How the team gets from where it is to where it is to stand: the leader's second job, after who stands where.
 
-The agent is independent. It waits for nobody, so of it is planned only where it will be in the next moments
-(:data:`FORESIGHT_S`): anywhere on that way, at any time. And it has no body here, for nobody can promise to keep out of
-the way of somebody who goes where he likes. Robots that are not heard any more stand somewhere on the way that they
-were last allowed, and are in the way of all others.
+The agent waits for nobody. If it announces its way, only where it will be in the next moments (:data:`FORESIGHT_S`) is
+planned for: anywhere on that way, at any time. If it does not, no sight of it is promised. And it has no body here, for
+nobody can promise to keep out of the way of somebody who goes where he likes. Robots that are not heard any more stand
+somewhere on the way that they were last allowed, and are in the way of all others.
 
 What is asked of lines of sight, from strict to lax:
 
-1. the whole team and the agent's next moments are one network,
+1. the whole team and the agent's next moments are one network, if it announces them,
 2. base station and robots are,
 3. base station and the last relays, of this deployment and of the one before, are, over any others,
 4. nothing: the discs only keep apart.
@@ -32,6 +32,7 @@ from agents.motion_level import joined_members
 from agents.motion_message import to_motion
 from agents.movement_authority import Onset
 from agents.outlook import Prospect
+from agents.whereabouts import Whereabouts
 from planning.foresight import distance, head, walk
 from planning.motion import Motion as TeamMotion
 from planning.motion import plan_motion
@@ -122,13 +123,13 @@ class MotionPlanner:
         self.geodesics = placements.geodesics
         self.base, self._agent = mission.base_station.name, mission.tracked_agent.name
 
-    def plan(self, onset: Onset, options: Sequence[Option], way: Floats, lost: Mapping[str, Floats]) -> Course:
+    def plan(self, onset: Onset, options: Sequence[Option], agent: Whereabouts, lost: Mapping[str, Floats]) -> Course:
         """A motion to the goals of one of the options.
 
         Args:
             onset: where it begins.
             options: the first is preferred.
-            way: (m, 2) float, metres: the agent's, from where it will be at the onset.
+            agent: where the agent may be at the onset, and go.
             lost: (m, 2) each: where robots may be that are not heard any more.
 
         Returns:
@@ -139,7 +140,7 @@ class MotionPlanner:
 
         Complexity: that of a schedule, for each demand that cannot be met and the first that can.
         """
-        prospect = Prospect(self._environment, way, self._mission.agent_speed_m_s)
+        prospect = Prospect(self._environment, agent, self._mission.agent_speed_m_s)
         ways = [self._geodesics_of(onset, option) for option in options]
         driven_m = prospect.times_s * self._mission.robot_speed_m_s
         hoped_s = max(
@@ -150,14 +151,15 @@ class MotionPlanner:
         options = [options[index] for index in sorted(range(len(options)), key=lambda index: conflicts[index])]
         members = len(onset.places)  # those that go as they please come last
         candidates: list[Candidate] = []
-        for laxity in (0, 3, 1, 2):  # what asks for nothing says what can be won by asking for less
+        strictest = 0 if agent.announced else 1
+        for laxity in dict.fromkeys((strictest, 3, 1, 2)):  # what asks for nothing says what asking for less can win
             for option in options:
                 joined = self._demand(onset, option, laxity)
-                found = self._find(onset, option, joined, way, lost)
+                found = self._find(onset, option, joined, agent, lost)
                 holds_s = prospect.worth(found.schedule.positions(prospect.times_s)[:, :members])
-                worth_s = holds_s - LAXITY_S * laxity - STRANDED_S * (not found.arrives)
+                worth_s = holds_s - LAXITY_S * (laxity - strictest) - STRANDED_S * (not found.arrives)
                 candidates.append(Candidate(worth_s, laxity, option, found))
-                if laxity == 0 and found.way == "direct" and holds_s >= hoped_s - SLOWER_S:
+                if laxity == strictest and found.way == "direct" and holds_s >= hoped_s - SLOWER_S:
                     break
             best = max(candidates, key=lambda candidate: candidate.worth_s)
             if best.found.arrives and (best.laxity < laxity or best.worth_s >= hoped_s - SLOWER_S):
@@ -166,7 +168,7 @@ class MotionPlanner:
         return self._certify(onset, best.option, best.found, lost, candidates[0].found.reason if less else "")
 
     def _find(
-        self, onset: Onset, option: Option, joined: frozenset[str], way: Floats, lost: Mapping[str, Floats]
+        self, onset: Onset, option: Option, joined: frozenset[str], agent: Whereabouts, lost: Mapping[str, Floats]
     ) -> TeamMotion:
         """The motion to an option's goals in which these members stay in one network."""
         mission = self._mission
@@ -174,7 +176,7 @@ class MotionPlanner:
         standing = {name: _point(where[0]) for name, where in lost.items() if len(where) == 1}
         starts = {self.base: onset.places[self.base], **{name: onset.places[name] for name in option.goals}, **standing}
         goals = {**starts, **option.goals}
-        ahead = head(way, FORESIGHT_S * mission.agent_speed_m_s)
+        ahead = head(agent.ways[0], FORESIGHT_S * mission.agent_speed_m_s)
         return plan_motion(
             self._environment,
             list(starts.values()),

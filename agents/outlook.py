@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from agents.whereabouts import Whereabouts
 from planning.environment import Environment
 from planning.foresight import chain_holds, length, walk
 from planning.geodesic import GeodesicMap
@@ -35,48 +36,61 @@ SPARE_S: Final = 0.1
 
 
 class Prospect:
-    """How long base and agent will be joined, for an agent on its announced way.
+    """How long base and agent will be joined, for an agent on any of its ways.
 
     Args:
         environment: the map as drawn.
-        way: (m, 2) float, metres: the agent's, from where it is to where it will stop.
-        agent_speed_m_s: along ``way``.
+        agent: where it may be and go, p ways.
+        agent_speed_m_s: along them.
     """
 
-    def __init__(self, environment: Environment, way: Floats, agent_speed_m_s: float) -> None:
+    def __init__(self, environment: Environment, agent: Whereabouts, agent_speed_m_s: float) -> None:
         self._environment = environment
         self.times_s = np.arange(STEP_S, FORESIGHT_S + STEP_S / 2, STEP_S)
         """(t,) float, seconds from now on: those that are looked at."""
-        self._agent = walk(way, self.times_s * agent_speed_m_s)
+        self._chances = agent.chances
+        self._agent = np.stack([walk(way, self.times_s * agent_speed_m_s) for way in agent.ways])
 
     def holds(self, team: Floats) -> Bools:
-        """At which times the chain holds (t,) for a team that is there (t, k, 2), metres, the base station first."""
-        return chain_holds(self._environment, np.concatenate((team, self._agent[:, None]), axis=1))
+        """At which times the chain holds, (p, t), for a team that is there, the base station first.
 
-    def holds_at_last(self, team: Sequence[Point]) -> bool:
-        """Whether it holds for a team that stands at these places, the base station first, at the last of the times."""
-        return bool(chain_holds(self._environment, np.array([[*team, self._agent[-1]]]))[0])
+        Args:
+            team: (t, k, 2) or (p, t, k, 2) float, metres: whatever way the agent takes, or for each.
+        """
+        ways, times, _ = self._agent.shape
+        everywhere = np.broadcast_to(team, (ways, *team.shape[-3:]))
+        tracks = np.concatenate((everywhere, self._agent[:, :, None]), axis=2)
+        return chain_holds(self._environment, tracks.reshape(ways * times, -1, 2)).reshape(ways, times)
 
-    def value(self, holds: Bools) -> float:
-        """Seconds of a chain that holds at these times, later ones counted less."""
-        return STEP_S * float(np.exp(-self.times_s[holds] / FADING_S).sum())
+    def holds_at_last(self, team: Sequence[Point]) -> Bools:
+        """Whether it holds, (p,), for a team that stands at these places at the last of the times."""
+        places = np.broadcast_to(np.array(team), (len(self._agent), len(team), 2))
+        return chain_holds(self._environment, np.concatenate((places, self._agent[:, -1:]), axis=1))
+
+    def value(self, holds: Bools) -> Floats:
+        """Seconds of a chain that holds at these times (p, t), later ones counted less: (p,)."""
+        return np.array([STEP_S * float(np.exp(-self.times_s[row] / FADING_S).sum()) for row in holds])
+
+    def expect(self, worth_s: Floats) -> float:
+        """What is worth so much on each way (p,), by their chances."""
+        return float(self._chances @ worth_s)
 
     def worth(self, team: Floats) -> float:
-        """The same of a team that is there (t, k, 2); a chain that is broken at last stays so for long."""
+        """Seconds of a chain that holds, for a team as in :meth:`holds`; broken at last, it stays so for long."""
         holds = self.holds(team)
-        return self.value(holds) - LEFT * HOPELESS_S * (not holds[-1])
+        return self.expect(self.value(holds) - LEFT * HOPELESS_S * ~holds[:, -1])
 
 
 class Outlook:
-    """The next seconds of one moment: agent and robots where they are, the agent on its announced path.
+    """The next seconds of one moment: agent and robots where they are, the agent on its ways.
 
     Args:
         environment: the map as drawn.
         geodesics: shortest paths of the robots.
         base: where the base station stands.
-        way: (m, 2) float, metres: the agent's, from where it is to where it will stop.
+        agent: where it may be and go.
         robots: where they are, in free space.
-        agent_speed_m_s: along ``way``.
+        agent_speed_m_s: along its way.
         robot_speed_m_s: along geodesics.
         distance_m: what spares keep from the agent.
     """
@@ -86,16 +100,17 @@ class Outlook:
         environment: Environment,
         geodesics: GeodesicMap,
         base: Point,
-        way: Floats,
+        agent: Whereabouts,
         robots: Mapping[str, Point],
         *,
         agent_speed_m_s: float,
         robot_speed_m_s: float,
         distance_m: float,
     ) -> None:
-        self._prospect = Prospect(environment, way, agent_speed_m_s)
+        self._prospect = Prospect(environment, agent, agent_speed_m_s)
         self._geodesics, self._base, self._robots = geodesics, base, robots
-        self._way, self._walked_m = way, np.minimum(self._prospect.times_s * agent_speed_m_s, length(way))
+        walked_m = self._prospect.times_s * agent_speed_m_s
+        self._walks = [(way, np.minimum(walked_m, length(way))) for way in agent.ways]
         self._driven_m = self._prospect.times_s * robot_speed_m_s
         self._robot_speed_m_s, self._distance_m = robot_speed_m_s, distance_m
         self._ways: dict[tuple[str, Point], Floats] = {}
@@ -104,28 +119,30 @@ class Outlook:
     def worth(self, relays: Sequence[Placement]) -> float:
         """What it is worth to send these relays, in seconds of a chain that holds.
 
-        Relays drive to their places, all others follow the agent.
+        Relays drive to their places, all others follow the agent, whatever way it takes.
 
-        Complexity: one geodesic for each robot and place not asked for before; O(t k² w) for t steps.
+        Complexity: one geodesic for each robot and place not asked for before; O(p t k² w) for t steps on p ways.
         """
         places = {relay.robot: relay.position for relay in relays}
-        tracks = [
-            self._follow(name) if name not in places else walk(self._to(name, places[name]), self._driven_m)
-            for name in self._robots
-        ]
-        base = np.broadcast_to(np.array(self._base), (len(self._driven_m), 2))
-        holds = self._prospect.holds(np.stack([base, *tracks], axis=1))
-        worth = self._prospect.value(holds) - SPARE_S * len(relays)
-        if not holds[-1]:
-            worth -= LEFT * self._broken_after_s(places)
-        return worth
+        shape = (len(self._walks), len(self._driven_m), 2)
+        tracks = [np.broadcast_to(np.array(self._base), shape)]
+        for name in self._robots:
+            if name in places:
+                tracks.append(np.broadcast_to(walk(self._to(name, places[name]), self._driven_m), shape))
+            else:
+                tracks.append(self._follow(name))
+        holds = self._prospect.holds(np.stack(tracks, axis=2))
+        worth_s = self._prospect.value(holds) - SPARE_S * len(relays)
+        broken = ~holds[:, -1]
+        if broken.any():
+            worth_s -= LEFT * np.where(broken, self._broken_after_s(places), 0.0)
+        return self._prospect.expect(worth_s)
 
-    def _broken_after_s(self, places: Mapping[str, Point]) -> float:
-        """How long after the last step the chain stays broken."""
-        if not self._prospect.holds_at_last([self._base, *places.values()]):
-            return HOPELESS_S
+    def _broken_after_s(self, places: Mapping[str, Point]) -> Floats:
+        """How long after the last step the chain stays broken, on each way."""
         farthest_m = max((length(self._to(name, place)) for name, place in places.items()), default=0.0)
-        return min(max(farthest_m / self._robot_speed_m_s - FORESIGHT_S, 0.0), HOPELESS_S)
+        arrives_s = min(max(farthest_m / self._robot_speed_m_s - FORESIGHT_S, 0.0), HOPELESS_S)
+        return np.where(self._prospect.holds_at_last([self._base, *places.values()]), arrives_s, HOPELESS_S)
 
     def _to(self, name: str, place: Point) -> Floats:
         if (name, place) not in self._ways:
@@ -133,11 +150,13 @@ class Outlook:
         return self._ways[name, place]
 
     def _follow(self, name: str) -> Floats:
-        """A spare's track: to where the agent is, then after it, at a distance."""
+        """A spare's tracks (p, t, 2): to where the agent is, then after it, at a distance."""
         if name not in self._following:
-            here = self._geodesics.nearest(self._way[0])
-            to_agent = self._geodesics.path(self._robots[name], here)
-            behind_m = length(to_agent) + self._walked_m - self._distance_m
-            way = np.concatenate((to_agent, self._way[1:]))
-            self._following[name] = walk(way, np.clip(behind_m, 0.0, self._driven_m))
+            tracks = []
+            for own, walked_m in self._walks:
+                to_agent = self._geodesics.path(self._robots[name], self._geodesics.nearest(own[0]))
+                behind_m = length(to_agent) + walked_m - self._distance_m
+                way = np.concatenate((to_agent, own[1:]))
+                tracks.append(walk(way, np.clip(behind_m, 0.0, self._driven_m)))
+            self._following[name] = np.stack(tracks)
         return self._following[name]

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.movement_authority import Onset
+from agents.target_set import TargetSet
 from protocol.messages import Point
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ class Question:
     """What is known when a plan is asked for."""
 
     way: tuple[Point, ...]
-    """The agent's, from where it is."""
+    """The agent's, from where it is; empty if it does not announce it."""
     onset: Onset
     """Where the robots will be when a new motion can begin."""
     lead_s: float
@@ -35,6 +36,10 @@ class Question:
     """Where the motion under way leads; empty if there is none, or it does not lead to the goals."""
     lost: Mapping[str, Floats] = field(default_factory=dict)
     """(m, 2) each: where robots may be that are not heard any more."""
+    target: TargetSet | None = None
+    """Where an agent may be that announces no way; None: nothing has been measured yet."""
+    drift_m_s: Point = (0.0, 0.0)
+    """How the middle of that set has been moving."""
 
 
 @dataclass(frozen=True, eq=False)

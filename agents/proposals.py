@@ -1,4 +1,4 @@
-"""The chains that a leader considers: for where the agent is, and for where it will be some metres farther on its way.
+"""The chains that a leader considers: for where the agent may be, and for where it may be some metres on.
 
 What a chain costs, in metres, and what every search minimises:
 
@@ -10,10 +10,12 @@ robots, ``"one-edge"`` and ``"fixed"`` (thesis §3.5–3.6) stay within one edge
 is the standing chain, and the spares hang on the agent, whom they follow: so one edge less and one more make the spare
 at the agent the last relay, or a relay a spare.
 
-A chain for the agent some metres on is to keep it in sight all the way: its last relay sees every place until there.
-Only where the robots make no such chain, one serves that sees the agent when it has arrived. Which of the two it is,
-the proposal's reason says; its lower bound is one for chains of that kind, by any robots in any order. So a chain that
-loses sight of the agent on the way may well cost less.
+A chain is made for each *aim* (:mod:`agents.whereabouts`). Its last relay is to see all places of it: of an agent that
+announces its way, every place of a piece of that; of an independent one, every place where it may be, now or when it
+has gone so many metres. Only where the robots make no such chain, one serves that sees a part: the agent when it has
+arrived, or the most of the set, at UNSEEN_M for all that is not seen. Which of the two it is, the proposal's reason
+says; its lower bound is one for chains of that kind, by any robots in any order. So a chain that loses sight of the
+agent on the way may well cost less.
 """
 
 from __future__ import annotations
@@ -21,15 +23,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import combinations, groupby, pairwise
 from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from agents.whereabouts import Aim, Whereabouts
 from planning.chain import cheapest_chain
 from planning.deployment import NO_CHAIN, identify_robots
-from planning.foresight import length, walk
 from planning.placement_graph import PlacementGraph
 from planning.redeployment import Search, redeploy
 from protocol.messages import Placement, Point
@@ -37,9 +40,6 @@ from protocol.messages import Placement, Point
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
-
-PREVIEWS_M: Final = (0.0, 1.5, 4.0, 8.0, 16.0)
-"""How far ahead on the agent's path the proposed chains reach."""
 
 METRES_PER_WEIGHT: Final = 3.0
 """A virtual weight of 1 is worth so many metres of driving."""
@@ -50,8 +50,11 @@ RELAY_M: Final = 1.5
 LATENESS: Final = 3.0
 """A metre that a robot drives while the agent is already where it needs it counts so many times more."""
 
-PIECE_M: Final = 0.5
-"""Whether a relay sees the agent's way is asked so often."""
+UNSEEN_M: Final = 60.0
+"""To see nothing of what a chain is for is as bad as to drive so many metres."""
+
+KEPT_POINTS: Final = 1024
+"""Of so many points it is remembered which placements see them."""
 
 ROUNDING: Final = 1e-9
 """Relative: costs that differ by less are the same."""
@@ -115,48 +118,44 @@ class Proposer:
         self._links = METRES_PER_WEIGHT * np.where(near, np.inf, graph.weights)
         np.fill_diagonal(self._links, 0.0)
         self._relays = graph.relays_from(base)
+        self._link_weights = lru_cache(KEPT_POINTS)(lambda x, y: graph.link_weights((x, y)))
 
     def chains(
-        self, way: Floats, robots: Mapping[str, Point], standing: Sequence[str], obstacles: Sequence[Point] = ()
+        self, agent: Whereabouts, robots: Mapping[str, Point], standing: Sequence[str], obstacles: Sequence[Point] = ()
     ) -> list[Proposal]:
-        """One for each preview that the robots suffice for.
+        """One for each aim that the robots suffice for.
 
         Args:
-            way: (m, 2) float, metres: the agent's, from where it is.
+            agent: where it may be.
             robots: where they are, in free space.
             standing: relays of the chain that there is, from the base outward.
             obstacles: where nobody can stand.
         """
-        order = _order(way[0], robots, standing)
+        order = _order(np.array(agent.center), robots, standing)
         tree = _tree(order, standing)
         drive = np.array([self._graph.distances_from(robots[name]) for name in order]).reshape(
             len(order), len(self._graph)
         )
         drive[:, self._taken(obstacles)] = np.inf
-        previews = sorted({min(preview, length(way)) for preview in PREVIEWS_M})
-        found = [self._chain(way, preview, order, drive, self._search, tree) for preview in previews]
+        found = [self._chain(aim, order, drive, self._search, tree) for aim in agent.aims]
         if self._search in ("one-edge", "fixed") and not any(found):
             # The team's tree is too far from one that serves.
-            found = [self._chain(way, preview, order, drive, "chain", tree) for preview in previews]
+            found = [self._chain(aim, order, drive, "chain", tree) for aim in agent.aims]
         return [proposal for proposal in found if proposal is not None]
 
-    def _chain(
-        self, way: Floats, preview: float, order: list[str], drive: Floats, search: Search, tree: Ints
-    ) -> Proposal | None:
-        """The cheapest chain for an agent that goes so far on its way; None if the robots make none."""
-        pieces = walk(way, np.linspace(0.0, preview, 1 + math.ceil(preview / PIECE_M)))
-        direct = self._graph.direct_weights(self._base, pieces)
-        weights = self._graph.link_weights(pieces[-1])
-        here = name_place(way[0])
-        there = f"for the agent {preview:.1f} m on from {here}" if preview > 0.0 else f"for the agent at {here}"
-        whole = f"for the agent at {here} and all its way {preview:.1f} m on" if preview > 0.0 else there
+    def _chain(self, aim: Aim, order: list[str], drive: Floats, search: Search, tree: Ints) -> Proposal | None:
+        """The cheapest chain for an aim; None if the robots make none."""
+        direct = self._graph.direct_weights(self._base, aim.places)
         if np.isfinite(direct).all():
-            cost = METRES_PER_WEIGHT * float(direct[-1])
-            return Proposal((), True, f"no relay needed {whole}", float(direct[-1]), cost, cost)
+            weight = float(aim.shares @ direct)
+            cost = METRES_PER_WEIGHT * weight
+            return Proposal((), True, f"no relay needed {aim.whole}", weight, cost, cost)
         # The robots have until the agent is there.
-        move = drive + LATENESS * np.maximum(0.0, drive - preview * self._speed_ratio)
-        for sees, purpose in ((self._graph.sees_all(pieces), whole), (np.isfinite(weights), there)):
-            to_agent = np.where(sees, METRES_PER_WEIGHT * weights, np.inf)
+        move = drive + LATENESS * np.maximum(0.0, drive - aim.ahead_m * self._speed_ratio)
+        weights, share = self._view(aim)
+        for sees, purpose in ((self._graph.sees_all(aim.places), aim.whole), (share > 0.0, aim.part)):
+            unseen_m = UNSEEN_M * (1.0 - share)
+            to_agent = np.where(sees, METRES_PER_WEIGHT * weights + unseen_m, np.inf)
             found = self._find(move, to_agent, search, tree)
             if found is not None:
                 if self._crowded(found.places):
@@ -165,14 +164,28 @@ class Proposer:
                     self._placement(order[robot], place)
                     for robot, place in zip(found.robots, found.places, strict=True)
                 )
+                last = found.places[-1]
                 links = [self._from_base[found.places[0]], *(self._links[hop] for hop in pairwise(found.places))]
-                cost = float(sum(links) + to_agent[found.places[-1]]) / METRES_PER_WEIGHT
+                cost = float(sum(links)) / METRES_PER_WEIGHT + float(weights[last])
                 driven = float(sum(move[stop] for stop in zip(found.robots, found.places, strict=True)))
-                total_m = driven + RELAY_M * len(relays) + METRES_PER_WEIGHT * cost
+                total_m = driven + RELAY_M * len(relays) + METRES_PER_WEIGHT * cost + float(unseen_m[last])
                 # A search adds up in another order.
                 bound_m = total_m if found.lower_bound_m >= total_m * (1.0 - ROUNDING) else found.lower_bound_m
-                return Proposal(relays, True, f"{relays_in_words(len(relays))} {purpose}", cost, total_m, bound_m)
+                seen = "" if share[last] == 1.0 else f", {share[last]:.0%} of that in sight"
+                reason = f"{relays_in_words(len(relays))} {purpose}{seen}"
+                return Proposal(relays, True, reason, cost, total_m, bound_m)
         return None
+
+    def _view(self, aim: Aim) -> tuple[Floats, Floats]:
+        """Of each placement the mean weight of its links to what it sees of an aim, and how much of it that is."""
+        counting = aim.shares > 0.0
+        rows = np.array([self._link_weights(x, y) for x, y in aim.places[counting].tolist()])
+        shares = aim.shares[counting, None]
+        seen = np.isfinite(rows)
+        share = np.where(seen.all(axis=0), 1.0, (shares * seen).sum(axis=0))
+        with np.errstate(invalid="ignore"):
+            mean = (shares * np.where(seen, rows, 0.0)).sum(axis=0) / share
+        return np.where(share > 0.0, mean, np.inf), share
 
     def _find(self, move: Floats, to_agent: Floats, search: Search, tree: Ints) -> Found | None:
         """The chain of one search."""
@@ -213,6 +226,18 @@ class Proposer:
         needed[np.isfinite(self._graph.direct_weights(self._base, places))] = 0
         return needed
 
+    def relays_for(self, aim: Aim) -> int:
+        """Fewest relays of a chain that sees all of an aim, or as much as one can; NO_CHAIN if none sees anything."""
+        if np.isfinite(self._graph.direct_weights(self._base, aim.places)).all():
+            return 0
+        return int(min(self._relays[self._best_views(aim)], default=NO_CHAIN))
+
+    def _best_views(self, aim: Aim) -> Bools:
+        """The placements that a chain reaches and that see most of an aim; none where none sees anything of it."""
+        share = np.where(self._relays == NO_CHAIN, 0.0, self._view(aim)[1])
+        best: Bools = (share > 0.0) & (share >= share.max() * (1.0 - ROUNDING))
+        return best
+
     def _taken(self, obstacles: Sequence[Point]) -> Bools:
         """Which placements are too near to obstacles."""
         gaps = self._graph.positions[:, None] - np.reshape(obstacles, (-1, 2))
@@ -223,13 +248,13 @@ class Proposer:
         points = self._graph.positions[list(places)].tolist()
         return any(math.dist(one, other) < self._apart_m for one, other in combinations(points, 2))
 
-    def outward(self, agent: Point, robots: Mapping[str, Point], obstacles: Sequence[Point] = ()) -> Proposal:
+    def outward(self, aim: Aim, robots: Mapping[str, Point], obstacles: Sequence[Point] = ()) -> Proposal:
         """Too few robots for a chain: those that there are man one of fewest relays from the base outward.
 
-        The agent's place must be one that a chain reaches.
+        There must be a chain for the aim.
         """
-        weights = np.where(self._taken(obstacles), np.inf, self._graph.link_weights(agent))
-        needed = int(self.relays_needed(agent)[0])
+        needed = self.relays_for(aim)
+        weights = np.where(self._taken(obstacles) | ~self._best_views(aim), np.inf, self._view(aim)[0])
         # Back to the base, where there is a choice by the cheapest link.
         places = [int(np.argmin(np.where(self._relays == needed, weights, np.inf)))]
         for relays in range(needed - 1, 0, -1):
@@ -277,12 +302,6 @@ def path_between(tree: Ints) -> list[int]:
     while path[-1] != BASE:
         path.append(before[path[-1]])
     return path[-2:0:-1]
-
-
-def name_place(point: Point | Floats) -> str:
-    """A place in words, to the centimetre."""
-    x, y = (round(float(value), 2) for value in point)
-    return f"({x:.12g}, {y:.12g}) m"
 
 
 def relays_in_words(number: int) -> str:

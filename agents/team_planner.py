@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from agents.assignment import assign
 from agents.motion_planner import Option
 from agents.planning_job import Answer, Question
+from agents.roaming import Roaming
+from agents.whereabouts import Whereabouts, announce
 from planning.foresight import tail
 from planning.reach_in_sight import time_in_sight
 from protocol.messages import Point
@@ -38,6 +40,7 @@ class TeamPlanner:
         deployments: who stands where.
         motions: who goes how.
         agent_speed_m_s: the most that the agent can go.
+        roaming: where it can go if it does not announce its way; None: it does.
     """
 
     def __init__(
@@ -46,17 +49,18 @@ class TeamPlanner:
         deployments: DeploymentPlanner,
         motions: MotionPlanner,
         agent_speed_m_s: float,
+        roaming: Roaming | None = None,
     ) -> None:
         self._environment, self._deployments, self._motions = environment, deployments, motions
-        self._agent_speed_m_s = agent_speed_m_s
+        self._agent_speed_m_s, self._roaming = agent_speed_m_s, roaming
 
     def plan(self, question: Question) -> Answer:
         """Who is to stand where, for the agent as it will be when the robots can begin to go there, and how."""
         onset = question.onset
-        way = tail(question.way, question.lead_s * self._agent_speed_m_s)
+        agent = self._expect(question)
         robots = {name: place for name, place in onset.places.items() if name != self._motions.base}
         obstacles = [place for lost in question.lost.values() for place in _points(lost)]
-        plan = self._deployments.plan(_point(way[0]), _points(way), robots, question.previous, obstacles)
+        plan = self._deployments.plan(agent, robots, question.previous, obstacles)
         last = _last_relay(plan)
         watcher = onset.places[self._motions.base if last is None else last]
         in_sight_s = min(LOOKED_AHEAD_S, self._time_in_sight(watcher, question))
@@ -66,7 +70,7 @@ class TeamPlanner:
         plans = [plan, *(self._exchange(plan, robots, among, question.previous) for among in (going, robots))]
         options = {_option(choice, question.previous, robots): choice for choice in dict.fromkeys(plans)}
         try:
-            course = self._motions.plan(onset, list(options), way, question.lost)
+            course = self._motions.plan(onset, list(options), agent, question.lost)
         except ValueError as problem:
             return Answer(plan, None, str(problem), in_sight_s)
         return Answer(options[course.option], course, in_sight_s=in_sight_s)
@@ -74,8 +78,17 @@ class TeamPlanner:
     def _time_in_sight(self, watcher: Point, question: Question) -> float:
         """From the onset on; the agent may have gone anywhere until then."""
         speed_m_s = self._agent_speed_m_s
-        gone_m = question.lead_s * speed_m_s
-        return time_in_sight(self._environment, watcher, question.way[0], speed_m_s, gone_m)
+        target = question.way[:1] if question.target is None else question.target.samples
+        if not target:
+            return 0.0
+        return time_in_sight(self._environment, watcher, target, speed_m_s, question.lead_s * speed_m_s)
+
+    def _expect(self, question: Question) -> Whereabouts:
+        """Where the agent may be when the robots can begin to go."""
+        gone_m = question.lead_s * self._agent_speed_m_s
+        if self._roaming is None:
+            return announce(tail(question.way, gone_m))
+        return self._roaming.whereabouts(question.target, question.drift_m_s, gone_m)
 
     def _exchange(self, plan: Plan, robots: Mapping[str, Point], among: Collection[str], previous: Plan | None) -> Plan:
         """The same places, but none of some robots overtakes another: the search for relays does not ask that."""

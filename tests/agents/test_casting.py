@@ -14,6 +14,7 @@ import maps
 from agents.casting import Casting
 from agents.leader import PlacementKind
 from agents.mission import Mission, RosterEntry
+from agents.whereabouts import announce
 from planning.environment import Environment
 from planning.geodesic import GeodesicMap
 from protocol.messages import Point
@@ -68,12 +69,12 @@ def test_a_second_start_computes_nothing_of_the_map(
     first = Casting(mission, office)
     for name in names:
         first.cast(name)
-    plan = first.planner().plan(GOAL, (), ROBOTS, None)
+    plan = first.planner().plan(announce([GOAL]), ROBOTS, None)
     with monkeypatch.context() as patch:
         forbid_computing(patch)
         for name in names:  # each a process of its own, with nothing but the mission and the map
             Casting(mission, office).cast(name)
-        assert Casting(mission, office).planner().plan(GOAL, (), ROBOTS, None) == plan
+        assert Casting(mission, office).planner().plan(announce([GOAL]), ROBOTS, None) == plan
 
 
 def test_peers_share_the_spaces_that_they_drive_in(folder: Path, office: Environment, team: Mission) -> None:
@@ -108,7 +109,7 @@ def test_a_folder_that_cannot_be_written_to_changes_nothing(
         casting = Casting(team, office)
         for name in ("agent", "robot1"):
             casting.cast(name)
-        plans.append(casting.planner().plan(GOAL, (), ROBOTS, None))
+        plans.append(casting.planner().plan(announce([GOAL]), ROBOTS, None))
     assert plans[0] == plans[1]
 
 

@@ -14,6 +14,7 @@ import pytest
 import agents.leader
 import maps
 from agents.leader import DeploymentPlanner, Plan
+from agents.whereabouts import announce
 from planning.decomposition import decompose
 from planning.deployment import NoChain
 from planning.environment import Environment
@@ -71,20 +72,20 @@ def test_every_plan_is_a_chain_that_robots_can_stand_in(
     agent, goal, *starts = _places(office, 2 + planner.most_relays_needed() + seed % 3, seed)
     robots = _team(starts)
     way = [(float(x), float(y)) for x, y in GeodesicMap(office.inflated(RADIUS_M)).path(agent, goal)]
-    plan = planner.plan(agent, way, robots, None)
+    plan = planner.plan(announce([agent, *way]), robots, None)
     _check(plan, office, robots)
     assert plan.serves
     assert plan.relays_needed == planner.relays_needed(agent)
     for _ in range(3):
         robots = {placement.robot: placement.position for placement in plan.placements}
-        plan = planner.plan(agent, way, robots, plan)
+        plan = planner.plan(announce([agent, *way]), robots, plan)
         _check(plan, office, robots)
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_a_chain_for_an_agent_at_rest_sees_it(planner: DeploymentPlanner, office: Environment, seed: int) -> None:
     agent, *starts = _places(office, 1 + planner.most_relays_needed(), 50 + seed)
-    plan = planner.plan(agent, (), _team(starts), None)
+    plan = planner.plan(announce([agent]), _team(starts), None)
     last = plan.placements[len(plan.edges) - 2].position if len(plan.edges) > 1 else BASE
     assert office.line_of_sight(last, agent)
 
@@ -110,7 +111,7 @@ def test_too_few_robots_man_the_chain_from_the_base_outward(planner: DeploymentP
     assert needed >= 3
     for number in range(needed):
         robots = _team(_places(office, number, number))
-        plan = planner.plan(agent, (), robots, None)
+        plan = planner.plan(announce([agent]), robots, None)
         _check(plan, office, robots)
         assert not plan.serves
         assert len(plan.edges) == number
@@ -118,10 +119,10 @@ def test_too_few_robots_man_the_chain_from_the_base_outward(planner: DeploymentP
 
 
 def test_an_agent_in_sight_of_the_base_needs_no_relay(planner: DeploymentPlanner, office: Environment) -> None:
-    plan = planner.plan((4.5, 10.5), (), {}, None)
+    plan = planner.plan(announce([(4.5, 10.5)]), {}, None)
     assert plan == Plan((), (("home", "visitor"),), 0.0, 0, True, plan.reason, 0.0, 0.0)
     robots = _team(_places(office, 3, 1))
-    plan = planner.plan((4.5, 10.5), (), robots, None)
+    plan = planner.plan(announce([(4.5, 10.5)]), robots, None)
     assert all(placement.spare for placement in plan.placements)
 
 
@@ -129,9 +130,9 @@ def test_a_chain_that_serves_is_kept(planner: DeploymentPlanner, office: Environ
     """While the agent stands and everybody has arrived, every plan repeats the relays of the one before."""
     agent = (31.0, 12.5)
     robots = _team([BASE] * planner.most_relays_needed())
-    plan = planner.plan(agent, (), robots, None)
+    plan = planner.plan(announce([agent]), robots, None)
     robots = {placement.robot: placement.position for placement in plan.placements}
-    again = planner.plan(agent, (), robots, plan)
+    again = planner.plan(announce([agent]), robots, plan)
     assert again.edges == plan.edges
     assert [p for p in again.placements if not p.spare] == [p for p in plan.placements if not p.spare]
     assert again.reason == plan.reason
@@ -140,17 +141,17 @@ def test_a_chain_that_serves_is_kept(planner: DeploymentPlanner, office: Environ
 def test_a_lost_relay_is_replaced(planner: DeploymentPlanner, office: Environment) -> None:
     agent = (31.0, 12.5)
     robots = _team([BASE] * (planner.most_relays_needed() + 1))
-    plan = planner.plan(agent, (), robots, None)
+    plan = planner.plan(announce([agent]), robots, None)
     robots = {placement.robot: placement.position for placement in plan.placements}
     del robots[plan.placements[1].robot]
-    after = planner.plan(agent, (), robots, plan)
+    after = planner.plan(announce([agent]), robots, plan)
     _check(after, office, robots)
     assert after.serves
 
 
 def test_an_agent_outside_the_map_makes_everybody_wait(planner: DeploymentPlanner, office: Environment) -> None:
     robots = _team(_places(office, 2, 5))
-    plan = planner.plan((-50.0, 0.0), (), robots, None)
+    plan = planner.plan(announce([(-50.0, 0.0)]), robots, None)
     assert not plan.serves
     assert "(-50, 0) m is outside the map" in plan.reason
     assert {placement.robot: placement.position for placement in plan.placements} == robots
@@ -163,8 +164,8 @@ def test_equal_questions_have_equal_answers(office: Environment) -> None:
     answers = []
     for _ in range(2):
         planner = DeploymentPlanner(office, BASE, RADIUS_M, "inflection")
-        plan = planner.plan(agent, (agent, goal), _team(starts), None)
-        answers.append((plan, planner.plan(goal, (), _team(starts), plan)))
+        plan = planner.plan(announce([agent, goal]), _team(starts), None)
+        answers.append((plan, planner.plan(announce([goal]), _team(starts), plan)))
     assert answers[0] == answers[1]
 
 
@@ -190,7 +191,7 @@ def test_the_chain_mostly_holds_while_the_agent_walks(
         steps = math.ceil(float(np.hypot(*np.diff(way, axis=0).T).sum()) / step_s)
         for step in range(steps):
             if step % period == 0:
-                plan = planner.plan(agent, [agent, *_rest(way, step * step_s)], robots, plan)
+                plan = planner.plan(announce([agent, *_rest(way, step * step_s)]), robots, plan)
             assert plan is not None
             for placement in plan.placements:
                 way_there = geodesics.path(robots[placement.robot], placement.position)

@@ -17,6 +17,7 @@ from agents.motion_planner import MotionPlanner, Option
 from agents.movement_authority import MovementAuthority, Onset
 from agents.planning_job import Question
 from agents.team_planner import EXCHANGED, TeamPlanner
+from agents.whereabouts import announce
 from planning.certificate import certify
 from planning.compiled_map import CompiledMap
 from planning.environment import Environment
@@ -64,7 +65,7 @@ def test_a_motion_is_one_network_with_the_next_moments_of_the_agent() -> None:
     goals = {"robot1": (5.0, 3.0), "robot2": (9.0, 2.0), "robot3": (13.0, 1.0)}
     way = np.array([(15.0, 2.0), (19.0, 2.0)])
     onset = stand(BASE, robot1=(2.0, 1.0), robot2=(2.0, 2.0), robot3=(2.0, 3.0))
-    course = planner.plan(onset, [Option(goals, ["robot3"])], way, {})
+    course = planner.plan(onset, [Option(goals, ["robot3"])], announce(way), {})
     motion = course.motion
     assert course.arrives
     assert course.reason == ""
@@ -83,12 +84,12 @@ def test_whoever_is_in_the_way_exchanges_places() -> None:
     onset = stand((1.0, 0.35), robot1=(3.0, 0.35), robot2=(5.0, 0.35))
     crossing = Option({"robot1": (12.0, 0.35), "robot2": (9.0, 0.35)}, ["robot1"])
     way = np.array([(16.0, 0.35)])
-    alone = planner.plan(onset, [crossing], way, {})
+    alone = planner.plan(onset, [crossing], announce(way), {})
     assert not alone.arrives
     assert alone.reason
     check_certified(alone.motion, ALLEY, ())
     exchanged = Option({"robot2": (12.0, 0.35), "robot1": (9.0, 0.35)}, ["robot2"])
-    course = planner.plan(onset, [crossing, exchanged], way, {})
+    course = planner.plan(onset, [crossing, exchanged], announce(way), {})
     assert course.option is exchanged
     assert course.arrives
     check_certified(course.motion, ALLEY, None)
@@ -99,7 +100,7 @@ def test_a_lost_robot_is_gone_around() -> None:
     onset = stand(BASE, robot1=(3.0, 2.0))
     option = Option({"robot1": (17.0, 2.0)}, ["robot1"])
     for lost in ([(10.0, 2.0)], [(9.0, 2.0), (11.0, 2.2)]):
-        course = planner.plan(onset, [option], np.array([(18.0, 2.0)]), {"robot2": np.array(lost)})
+        course = planner.plan(onset, [option], announce(np.array([(18.0, 2.0)])), {"robot2": np.array(lost)})
         assert course.arrives
         ways = {way.member: way for way in course.motion.ways}
         assert not ways["robot2"].scheduled
@@ -113,7 +114,7 @@ def test_a_revision_keeps_what_was_released_and_is_certified_with_it() -> None:
     planner, _ = make_planner(HALL)
     robots = {"robot1": (2.0, 1.0), "robot2": (2.0, 2.0)}
     first = Option({"robot1": (9.0, 1.0), "robot2": (9.0, 3.0)}, ["robot1"])
-    course = planner.plan(stand(BASE, **robots), [first], np.array([(15.0, 2.0)]), {})
+    course = planner.plan(stand(BASE, **robots), [first], announce(np.array([(15.0, 2.0)])), {})
     authority = MovementAuthority(0, course.motion, robots)
     for robot in robots:
         authority.hear(robot, Progress(epoch=0, plan=0, revision=0, finished=0))
@@ -121,7 +122,7 @@ def test_a_revision_keeps_what_was_released_and_is_certified_with_it() -> None:
     onset = authority.onset()
     assert onset.kept is not None
     second = Option({"robot1": (5.0, 3.0), "robot2": (12.0, 2.0)}, ["robot2"])
-    revised = planner.plan(onset, [second], np.array([(15.5, 2.0)]), {}).motion
+    revised = planner.plan(onset, [second], announce(np.array([(15.5, 2.0)])), {}).motion
     assert (revised.plan, revised.revision, revised.first_stage) == (0, 1, 0)
     check_certified(revised, HALL, None)
     before = {way.member: way for way in course.motion.ways}

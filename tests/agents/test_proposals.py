@@ -15,7 +15,8 @@ import pytest
 
 import maps
 from agents.leader import DeploymentPlanner, PlacementKind, Plan
-from agents.proposals import LATENESS, METRES_PER_WEIGHT, PIECE_M, PREVIEWS_M, RELAY_M, Proposer, path_between
+from agents.proposals import LATENESS, METRES_PER_WEIGHT, RELAY_M, Proposer, path_between
+from agents.whereabouts import PIECE_M, PREVIEWS_M, announce
 from planning.chain import cheapest_chain
 from planning.environment import Environment
 from planning.foresight import chain_holds, length, walk
@@ -68,7 +69,7 @@ def test_a_plan_costs_what_its_robots_drive_and_its_links_weigh(kind: PlacementK
     planner = _planner(kind, search)
     plan: Plan | None = None
     for agent in agents:
-        plan = planner.plan(agent, (), robots, None if plan is None else replace(plan, serves=False))
+        plan = planner.plan(announce([agent]), robots, None if plan is None else replace(plan, serves=False))
         relays = _relays(plan)
         links = _links(kind, [BASE, *(place for _, place in relays), agent])
         driven = [planner.graph.geodesics.length(robots[name], place) for name, place in relays]
@@ -96,7 +97,7 @@ def test_the_fixed_search_pays_for_the_relays_that_it_keeps_alone() -> None:
     found = 0
     for standing in permutations(robots):
         way = np.array([(19.0, 5.5)])
-        for proposal in proposer.chains(way, robots, standing):
+        for proposal in proposer.chains(announce(way), robots, standing):
             driven = sum(graph.geodesics.length(robots[relay.robot], relay.position) for relay in proposal.relays)
             assert proposal.total_cost_m == pytest.approx(
                 (1.0 + LATENESS) * driven + RELAY_M * len(proposal.relays) + METRES_PER_WEIGHT * proposal.cost
@@ -116,7 +117,7 @@ def test_no_chain_of_the_named_kind_costs_less_than_the_bound(search: Search) ->
         here, there, *starts = _places(6, 70 + seed)
         way, robots = graph.geodesics.path(here, there), _team(starts)
         drive = np.array([graph.distances_from(place) for place in robots.values()])
-        for proposal in filter(lambda found: found.relays, proposer.chains(way, robots, [])):
+        for proposal in filter(lambda found: found.relays, proposer.chains(announce(way), robots, [])):
             ahead = re.search(r"([0-9.]+) m on", proposal.reason)
             preview = 0.0 if ahead is None else min({*PREVIEWS_M, length(way)}, key=lambda m: abs(m - float(ahead[1])))
             pieces = walk(way, np.linspace(0.0, preview, 1 + math.ceil(preview / PIECE_M)))
@@ -155,10 +156,12 @@ def test_the_plan_of_the_exact_search_costs_what_redeploy_says(kind: PlacementKi
     for row, place in enumerate(robots.values(), 2):
         move[row, 2:] = (1.0 + LATENESS) * graph.distances_from(place) + RELAY_M
     expected = redeploy(move, W, mu=METRES_PER_WEIGHT, search="exact", idle=True)
-    plan = planner.plan(agent, (), robots, None)
+    plan = planner.plan(announce([agent]), robots, None)
     assert plan.total_cost_m == pytest.approx(expected.cost)
     assert plan.lower_bound_m == pytest.approx(expected.lower_bound) == pytest.approx(expected.cost)
-    assert plan.total_cost_m == pytest.approx(_planner(kind, "chain").plan(agent, (), robots, None).total_cost_m)
+    assert plan.total_cost_m == pytest.approx(
+        _planner(kind, "chain").plan(announce([agent]), robots, None).total_cost_m
+    )
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -169,7 +172,7 @@ def test_every_search_keeps_a_team_joined_to_its_agent(kind: PlacementKind, sear
     robots = _team(_places(planner.most_relays_needed() + 1, 30))
     plan: Plan | None = None
     for agent in _places(6, 31):
-        plan = planner.plan(agent, (), robots, plan)
+        plan = planner.plan(announce([agent]), robots, plan)
         assert plan.serves
         stops = [BASE, *(place for _, place in _relays(plan)), agent]
         assert chain_holds(_office(), np.array([stops]))[0]
@@ -192,7 +195,7 @@ def _follow(search: Search, agents: list[Point]) -> list[Plan]:
     robots = _team([(1.0, 0.5), (1.5, 0.5), (2.0, 0.5), (2.5, 0.5)])
     plans: list[Plan] = []
     for agent in agents:
-        plans.append(planner.plan(agent, (), robots, plans[-1] if plans else None))
+        plans.append(planner.plan(announce([agent]), robots, plans[-1] if plans else None))
         robots = {place.robot: place.position for place in plans[-1].placements}
     return plans
 
