@@ -33,6 +33,7 @@ from planning.redeployment import redeploy
 from planning.shortest_paths import all_pairs, from_source
 from planning.steiner import steiner_tree
 from agents.leader import DeploymentPlanner
+from agents.whereabouts import announce
 
 for name, kind in (("room1", "aspect"), ("room2", "aspect"), ("office", "inflection")):
     environment = Environment.load(maps.path(name))
@@ -50,8 +51,8 @@ for name, kind in (("room1", "aspect"), ("room2", "aspect"), ("office", "inflect
     for placements in ("cells", "points"):
         for search in ("chain", "exact", "one-edge", "fixed"):
             planner = DeploymentPlanner(environment, base, 0.2, kind, placements=placements, search=search)
-            plan = planner.plan(agent, (agent,), robots, None)
-            planner.plan(agent, (agent,), robots, plan)
+            plan = planner.plan(announce([agent, agent]), robots, None)
+            planner.plan(announce([agent, agent]), robots, plan)
             planner.most_relays_needed()
 for method in ("exact", "mst", "takahashi-matsuyama"):
     steiner_tree(weights, [0, 1, 2], method)
