@@ -107,14 +107,14 @@ class LogLine(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag
 
 
 class Mishap(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag="mishap"):
-    """Something was done to the team on purpose, to see what it does (:mod:`launcher.chaos`)."""
+    """Something befell a process or a link: it crashed, or it was done on purpose (:mod:`launcher.chaos`)."""
 
     kind: str
-    """Of the fault, as in a timetable."""
+    """Of the fault, as in a timetable; ``crash`` if nobody wanted it."""
     who: tuple[str, ...]
     """Whose process or links it is."""
     text: str
-    """What was done, in a few words."""
+    """What it was, in a few words."""
     over: bool = False
     """Whether it is over with this, or begins."""
 
