@@ -73,12 +73,13 @@ class RejectingRule(Generic[SetT]):
 
     def __init__(self, operations: Operations[SetT]) -> None:
         self._operations = operations
-        self._rejections = 0
+        self.rejections = 0
+        """Ranges left out in a row."""
         self.held: SetT | None = None
 
-    def reset(self, held: SetT | None = None) -> None:
+    def reset(self, held: SetT | None = None, rejections: int = 0) -> None:
         """Go on from a set, or from nothing."""
-        self.held, self._rejections = held, 0
+        self.held, self.rejections = held, rejections
 
     def measure(self, annulus: Annulus) -> MeasurementReport:
         """Take a range into account, or leave it out."""
@@ -92,8 +93,8 @@ class RejectingRule(Generic[SetT]):
             redundant = rest is self.held
             self.reset(rest)
             return MeasurementReport(accepted=True, redundant=redundant, empty=False, restarted=False)
-        self._rejections += 1
-        restarted = possible and self._rejections >= REJECTIONS_BEFORE_RESTART
+        self.rejections += 1
+        restarted = possible and self.rejections >= REJECTIONS_BEFORE_RESTART
         if restarted:
             self.reset(self._operations.begin(annulus))
         return MeasurementReport(accepted=restarted, redundant=False, empty=True, restarted=restarted)

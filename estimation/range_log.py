@@ -14,7 +14,9 @@ import math
 from bisect import bisect_left, bisect_right, insort
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from hashlib import blake2b
 from operator import attrgetter
+from struct import pack
 
 Key = tuple[float, str, int]
 """Place of a range in the canonical order: time, peer, number."""
@@ -57,6 +59,13 @@ class TimedRange:
     def key(self) -> Key:
         """Place in the canonical order."""
         return self.time_s, self.peer, self.number
+
+    @property
+    def fingerprint(self) -> int:
+        """Of all of it, less than 2⁴⁸; the same everywhere."""
+        below, above = self.bound_m if isinstance(self.bound_m, tuple) else (self.bound_m, self.bound_m)
+        numbers = pack("<Q6d", self.number, self.time_s, *self.anchor, self.range_m, below, above)
+        return int.from_bytes(blake2b(self.peer.encode() + numbers, digest_size=6).digest(), "little")
 
 
 @dataclass(frozen=True)

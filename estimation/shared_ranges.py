@@ -15,6 +15,9 @@ roster member has it, or a stated horizon has passed. A range that comes after i
 counted; that costs area, never containment, and the peers may then differ. Of every name that ever measured a count
 stays for ever, some dozen bytes for each start of a peer.
 
+*Away for long.* Who lacks ranges that others hold no longer goes on from their base. Two who each lack folded ranges of
+the other's go on from the base that has more; what only the other had folded is lost, which costs area.
+
 All of it is state: no clock, no messages. ``digest`` and ``delta`` are what the team protocol is to carry.
 """
 
@@ -29,6 +32,9 @@ from typing import Generic, Protocol, TypeVar
 from numpy.typing import ArrayLike
 
 from estimation.range_log import BadRecord, Heard, Key, RangeLog, TimedRange
+
+_FINGERPRINTS = 1 << 48
+"""So many there are: numbers that every JSON reader holds exactly."""
 
 _MARK_EVERY = 16
 """Ranges between two kept states: a late range costs a replay from the mark before it."""
@@ -60,6 +66,8 @@ class Digest:
     peer: str
     clock_s: float
     heard: Mapping[str, Heard]
+    source: str = ""
+    """The name under which its ranges are kept; its own if empty."""
 
 
 @dataclass(frozen=True)
@@ -70,11 +78,13 @@ class Base(Generic[StateT]):
         key: the last folded place of the canonical order.
         state: the set at that range's time.
         heard: which ranges need not be sent any more: those folded, and those of their peers before them.
+        fingerprint: of the ranges folded.
     """
 
     key: Key
     state: StateT
     heard: Mapping[str, Heard]
+    fingerprint: int = 0
 
 
 class SharedRanges(Generic[StateT]):
@@ -87,6 +97,8 @@ class SharedRanges(Generic[StateT]):
         speed_m_s: v, the most that the target can walk; 0 for one that stands.
         clock_bound_s: the most by which any two peers' clocks differ.
         horizon_s: how long ranges are waited for.
+        source: the name under which this peer's ranges are kept: another one after every start, as each counts its
+            ranges from 0. The peer's own if empty.
 
     Raises:
         BadRecord: the peer is not in the roster, or a number is negative.
@@ -101,6 +113,7 @@ class SharedRanges(Generic[StateT]):
         speed_m_s: float = 0.0,
         clock_bound_s: float = 0.0,
         horizon_s: float = 60.0,
+        source: str = "",
     ) -> None:
         self._peer, self._roster, self._begin = peer, tuple(roster), begin
         self._speed, self._horizon = speed_m_s, horizon_s
@@ -109,13 +122,19 @@ class SharedRanges(Generic[StateT]):
             raise BadRecord(
                 f"'{peer}' must be in the roster {self._roster}, and speed, clock bound and horizon at least 0"
             )
+        self._source, self._made = source or peer, 0
         self._log = RangeLog()
         self._digests: dict[str, Digest] = {}
         self._base: tuple[Key | None, StateT] = (None, begin())
         self._marks: list[tuple[Key, StateT]] = []
         self._now: tuple[Key | None, StateT] = (None, begin())
-        self._last_s = -float("inf")
-        self._late = self._folded = 0
+        self._last_s = -math.inf
+        self._late = self._folded = self._fingerprint = 0
+
+    @property
+    def made(self) -> int:
+        """Ranges that this peer has measured under its present source."""
+        return self._made
 
     @property
     def late(self) -> int:
@@ -145,9 +164,8 @@ class SharedRanges(Generic[StateT]):
                 f"{self._peer}: a range at {time_s} s is earlier than what was said at {self._last_s} s: "
                 "stamp ranges with a clock that never goes back"
             )
-        number = self._log.heard.get(self._peer, Heard()).below
-        record = TimedRange(self._peer, number, time_s, anchor, range_m, bound_m)
-        self._last_s = time_s
+        record = TimedRange(self._source, self._made, time_s, anchor, range_m, bound_m)
+        self._last_s, self._made = time_s, self._made + 1
         self.receive([record])
         return record
 
@@ -175,7 +193,7 @@ class SharedRanges(Generic[StateT]):
     def digest(self, now_s: float) -> Digest:
         """What this peer says of itself; no range of it after this may be earlier than ``now_s``."""
         self._last_s = max(self._last_s, now_s)
-        return Digest(self._peer, self._last_s, self._log.heard)
+        return Digest(self._peer, self._last_s, self._log.heard, self._source)
 
     def delta(self, digest: Digest) -> list[TimedRange]:
         """The ranges that the sender of a digest lacks, in canonical order."""
@@ -189,14 +207,14 @@ class SharedRanges(Generic[StateT]):
         if known is None or digest.clock_s >= known.clock_s:
             self._digests[digest.peer] = digest
 
-    def fold(self, now_s: float) -> int:
-        """Fold what can be folded at a time of this peer's clock; how many ranges."""
-        own = Digest(self._peer, self._last_s, self._log.heard)
+    def fold(self, now_s: float, keep_s: float = 0.0) -> int:
+        """Fold what can be folded at a time of this peer's clock, but nothing younger than so long; how many ranges."""
+        own = Digest(self._peer, self._last_s, self._log.heard, self._source)
         digests = [own, *(self._digests.get(peer) for peer in self._roster if peer != self._peer)]
         given_up = count = len(self._log.before_time(now_s - self._horizon))
         said = [digest for digest in digests if digest is not None]
         if len(said) == len(self._roster) and all(self._has_all_of(digest) for digest in said):
-            complete = self._log.before_time(min(digest.clock_s for digest in said))
+            complete = self._log.before_time(min(now_s - keep_s, *(digest.clock_s for digest in said)))
             shared = 0
             for record in complete:
                 if not all(record.number in digest.heard.get(record.peer, Heard()) for digest in said):
@@ -225,29 +243,55 @@ class SharedRanges(Generic[StateT]):
         for peer, have in self._log.heard.items():
             first_held = min((number for owner, number in held if owner == peer), default=have.below)
             heard[peer] = Heard(min(have.below, first_held))
-        return Base(key, state, heard)
+        return Base(key, state, heard, self._fingerprint)
 
     def adopt(self, base: Base[StateT]) -> bool:
-        """Go on from another peer's base, if it reaches further than this peer's own. The log after it stays.
+        """Go on from another peer's base, if there is a range in it that this peer lacks. The log after it stays.
 
-        Own ranges before its end that it does not include are dropped and counted.
+        Not if this peer's own base has ranges that the other lacks, and more of them. Ranges before the end of the base
+        that it does not include are dropped, and those of the log counted as late.
         """
-        if self._base[0] is not None and base.key <= self._base[0]:
+        if not self._lacks(base.heard):
             return False
-        gone = len(self._log) - len(self._log.after(base.key))
-        dropped = list(self._log)[:gone]
+        own = self.base()
+        if own is not None and _misses(base.heard, own.heard) and _rank(own) >= _rank(base):
+            return False
+        kept = self._log.after(base.key)
+        dropped = list(self._log)[: len(self._log) - len(kept)]
         self._late += sum(record.number not in base.heard.get(record.peer, Heard()) for record in dropped)
-        self._log.release(gone)
+        self._log = RangeLog(kept)
         for peer, heard in base.heard.items():
             self._log.skip_below(peer, heard.below)
         self._base = base.key, deepcopy(base.state)
+        self._fingerprint = base.fingerprint
         self._marks = []
         self._now = base.key, deepcopy(base.state)
         return True
 
+    def needs_base(self, digest: Digest) -> bool:
+        """Whether the sender of a digest lacks ranges that have been folded here, so that no delta brings them."""
+        base = self.base()
+        return base is not None and _misses(digest.heard, base.heard)
+
+    def fingerprint(self, before_s: float) -> int | None:
+        """A number for all ranges stamped before a time: peers with equal ones have equal sets.
+
+        None where ranges from then on have been folded already. O(ranges held).
+        """
+        key, _ = self._base
+        if key is not None and key[0] >= before_s:
+            return None
+        return (
+            sum((record.fingerprint for record in self._log.before_time(before_s)), self._fingerprint) % _FINGERPRINTS
+        )
+
+    def _lacks(self, heard: Mapping[str, Heard]) -> bool:
+        return _misses(self._log.heard, heard)
+
     def _has_all_of(self, digest: Digest) -> bool:
         """Whether all ranges that a peer had made when it said so are here."""
-        return self._log.heard.get(digest.peer, Heard()).below >= digest.heard.get(digest.peer, Heard()).below
+        source = digest.source or digest.peer
+        return self._log.heard.get(source, Heard()).below >= digest.heard.get(source, Heard()).below
 
     def _fold(self, records: list[TimedRange], given_up: int) -> None:
         key, state = self._base
@@ -267,6 +311,7 @@ class SharedRanges(Generic[StateT]):
             self._now = end, deepcopy(state)
         self._log.release(len(records))
         self._folded += len(records)
+        self._fingerprint = sum((record.fingerprint for record in records), self._fingerprint) % _FINGERPRINTS
 
     def _go_back_before(self, key: Key) -> None:
         """Forget the states that a range at this place changes."""
@@ -301,3 +346,17 @@ class SharedRanges(Generic[StateT]):
         else:
             state.measure(record.anchor, record.range_m, (below + self._widening, above + self._widening))
         return record.key
+
+
+def _misses(heard: Mapping[str, Heard], others: Mapping[str, Heard]) -> bool:
+    """Whether who has heard the one lacks some of the other that is below."""
+    return any(
+        have.below > (mine := heard.get(peer, Heard())).below
+        and any(number not in mine for number in range(mine.below, have.below))
+        for peer, have in others.items()
+    )
+
+
+def _rank(base: Base[StateT]) -> tuple[int, Key]:
+    """The base of two that is kept: that of more ranges, then the later one."""
+    return sum(heard.below for heard in base.heard.values()), base.key

@@ -29,7 +29,7 @@ from numpy.typing import ArrayLike, NDArray
 from estimation import convex_growth, convex_pieces
 from estimation.convex_cut import MOST_VERTICES
 from estimation.convex_pieces import MOST_PIECES
-from estimation.outlier_rule import Outliers, make_rule
+from estimation.outlier_rule import Outliers, RejectingRule, make_rule
 from estimation.range_measurement import (
     PADDING_M,
     Annulus,
@@ -39,6 +39,7 @@ from estimation.range_measurement import (
     annulus,
     moved_distance,
 )
+from estimation.tight_snapshot import UNCHECKED_M, TightPiece, TightSnapshot
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -225,6 +226,68 @@ class TightSet:
         self._rule.reset()
         self._origin = None
 
+    def keep(self, which: NDArray[np.bool_]) -> None:
+        """Drop the pieces where the target is known not to be.
+
+        Args:
+            which: (m,) bool, of the pieces as `polygons` lists them; at least one.
+
+        Raises:
+            ValueError: none would be left, or outliers are not handled by "reject".
+        """
+        if not which.any():
+            raise ValueError("the target must be in some piece: keep at least one")
+        union = self._union
+        pieces, counts = union.pieces[which], union.counts[which]
+        area = convex_pieces.total_area(pieces, counts)
+        rule = self._rejecting()
+        rule.reset(_Union(pieces, counts, union.checked[which], union.annuli, area), rule.rejections)
+
+    def snapshot(self) -> TightSnapshot:
+        """All that another peer needs to go on with the set, exactly as it is here.
+
+        Raises:
+            NothingMeasured: there is no set yet.
+            ValueError: outliers are not handled by "reject".
+        """
+        union, (x, y) = self._union, self._origin or (0.0, 0.0)
+        pieces = tuple(
+            TightPiece(tuple((a, b) for a, b in corners[:count].tolist()), min(width, UNCHECKED_M))
+            for corners, count, width in zip(union.pieces, union.counts, union.checked.tolist(), strict=True)
+        )
+        annuli = tuple((a, b, inner, outer) for a, b, inner, outer in union.annuli.tolist())
+        return TightSnapshot((x, y), pieces, annuli, self._rejecting().rejections)
+
+    def restore(self, snapshot: TightSnapshot) -> None:
+        """Go on with the set of a snapshot.
+
+        Raises:
+            ValueError: it is no snapshot of a set: a piece has too few corners or too many, or is not convex and
+                counter-clockwise; there are no pieces, or too many; or outliers are not handled by "reject".
+        """
+        m = len(snapshot.pieces)
+        if not 1 <= m <= MOST_PIECES or not all(3 <= len(piece.corners) <= MOST_VERTICES for piece in snapshot.pieces):
+            raise ValueError(
+                f"a tight set has 1 to {MOST_PIECES} pieces of 3 to {MOST_VERTICES} corners; leave this one out"
+            )
+        pieces, counts = np.zeros((m, MOST_VERTICES, 2)), np.empty(m, dtype=np.int64)
+        for index, piece in enumerate(snapshot.pieces):
+            counts[index] = len(piece.corners)
+            pieces[index, : counts[index]] = piece.corners
+            if not _is_convex(pieces[index, : counts[index]]):
+                raise ValueError("the pieces of a tight set are convex and counter-clockwise; leave this set out")
+        checked = np.array([piece.checked_m for piece in snapshot.pieces])
+        checked[checked >= UNCHECKED_M] = math.inf
+        annuli = np.array(snapshot.annuli, dtype=np.float64).reshape(-1, 4)
+        area = convex_pieces.total_area(pieces, counts)
+        self._origin = snapshot.origin
+        self._rejecting().reset(_Union(pieces, counts, checked, annuli, area), snapshot.rejections)
+
+    def _rejecting(self) -> RejectingRule[_Union]:
+        if not isinstance(self._rule, RejectingRule):
+            raise ValueError('a relaxed set is several sets: only one made with outliers="reject" can do this')
+        return self._rule
+
     @property
     def area_m2(self) -> float:
         """Area, m²; overlaps that could not be parted count twice. Raises NothingMeasured before the first range."""
@@ -276,3 +339,12 @@ class TightSet:
         vertices = np.concatenate(self.polygons)
         point: Floats = vertices[np.argmax(np.hypot(*(vertices - np.asarray(start, dtype=np.float64)).T))]
         return point
+
+
+def _is_convex(corners: Floats) -> bool:
+    """Whether corners (n, 2) go round counter-clockwise and never turn right, up to rounding."""
+    along = np.roll(corners, -1, axis=0) - corners
+    onward = np.roll(along, -1, axis=0)
+    turns = along[:, 0] * onward[:, 1] - along[:, 1] * onward[:, 0]
+    slack = 1e-9 * (1.0 + np.hypot(*along.T) * np.hypot(*onward.T))
+    return bool((turns >= -slack).all())
