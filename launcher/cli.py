@@ -28,6 +28,7 @@ _PLACES = {"ignore_unknown_options": True}
 app.command()(live.demo)
 app.command()(live.run)
 app.command(context_settings=_PLACES)(live.goal)
+app.command()(live.fault)
 app.command()(offline.simulate)
 app.command()(plans.plan)
 app.command(name="map")(map_facts.show)

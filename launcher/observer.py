@@ -14,8 +14,19 @@ from agents.mission import Mission
 from planning.connectivity import chain_connected
 from planning.environment import Environment
 from protocol.bus import BusEvent, PeerAppeared, PeerVanished, Received
+from protocol.election import LEASE_S
 from protocol.keys import parse
-from protocol.messages import Deployment, Envelope, Heartbeat, Intent, MalformedMessage, Point, State, decode
+from protocol.messages import (
+    Deployment,
+    Envelope,
+    Heartbeat,
+    Intent,
+    MalformedMessage,
+    Point,
+    State,
+    VoteRequest,
+    decode,
+)
 
 SILENT_AFTER_S = 2.0
 """A peer that has said nothing for so long does not count as up, whatever its token says."""
@@ -85,6 +96,10 @@ class TeamView:
     goal: Point | None = None
     deployment: Deployment | None = None
     _known: dict[str, _Known] = field(default_factory=dict)
+    _reign: tuple[int, str] = (-1, "")
+    """The highest epoch that a leader in office has spoken in, and who that was."""
+    _reigned_at_s: float = float("-inf")
+    """When it was heard last."""
 
     def __post_init__(self) -> None:
         self._known = {entry.name: _Known() for entry in self.mission.roster}
@@ -125,13 +140,16 @@ class TeamView:
                 known.position, known.mode, known.obeying = position, mode, progress is not None
             case Intent(position=position, mode=mode, goal=goal):
                 known.position, known.mode, self.goal = position, mode, goal
+            case VoteRequest(epoch=epoch, warrant=warrant) if warrant is not None:
+                self._note_reign(epoch, envelope.sender, now_s)
             case Deployment() as deployment:
+                self._note_reign(deployment.authority.epoch, envelope.sender, now_s)
                 if self.deployment is None or _later(deployment, self.deployment):
                     self.deployment = deployment
 
-    def position(self, name: str) -> Point | None:
-        """Where a peer was last heard of."""
-        return self._known[name].position
+    def leader(self, now_s: float) -> str | None:
+        """Who has been heard to lead within the last lease, if anybody has."""
+        return self._reign[1] if now_s - self._reigned_at_s < LEASE_S else None
 
     def status(self, now_s: float) -> Status:
         """The team now. O(n²) lines of sight for n peers."""
@@ -155,6 +173,11 @@ class TeamView:
             chain_connected=connected,
             links=int((seen.sum() - len(placed)) // 2),
         )
+
+    def _note_reign(self, epoch: int, leader: str, now_s: float) -> None:
+        """A leader in office has spoken; an earlier reign that goes on speaking does not count."""
+        if epoch >= self._reign[0]:
+            self._reign, self._reigned_at_s = (epoch, leader), now_s
 
     def _peer(self, name: str, now_s: float) -> PeerStatus:
         known = self._known[name]

@@ -24,10 +24,7 @@ from rerun.experimental import ViewerClient
 from agents.recorder import JOURNAL
 from agents.recorder_layout import TIMELINE
 from agents.records import AnyRecord
-from launcher.run_folder import RunFolder
-
-RECORDINGS = "recordings"
-"""Folder of a run in which each process leaves its own file."""
+from launcher.run_folder import RECORDINGS, RunFolder
 
 _MERGING_S = 600.0
 _VIEWER_START_S = 30.0

@@ -1,4 +1,8 @@
-"""A live run, from a scenario file to a folder with a recording: check, start, watch, stop, merge, measure."""
+"""A live run, from a scenario file to a folder with a recording: check, start, watch, stop, merge, measure.
+
+While it runs, peers are killed and paused and links are cut on the scenario's timetable of faults, by keys on the
+terminal, and by ``sightline fault``.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +11,7 @@ import contextlib
 import signal
 import socket
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,10 +19,15 @@ from msgspec import structs
 from rich.console import Console
 from rich.live import Live
 
+from agents.body_places import BODIES, BodyPlaces
 from agents.mission import Mission
 from agents.runtime import import_all
 from launcher import status as display
+from launcher.chaos import Chaos, LiveFault, check_live
+from launcher.chaos_control import KEYS, hearing_keys, listening, obey, order_of_key
 from launcher.console import busy, tell
+from launcher.fault_timetable import FaultyTimetable, Timetable, read_timetable
+from launcher.journal import OBSERVER, Journal
 from launcher.observer import Status, TeamView
 from launcher.preparation import Preparation, prepare
 from launcher.processes import age_s
@@ -26,10 +35,8 @@ from launcher.run_folder import RunFolder
 from launcher.scenario import ScenarioFault
 from launcher.supervisor import Supervisor
 from protocol.inbox import Inbox
+from protocol.link_faults import LINKS, LinkTable
 from protocol.zenoh_bus import ZenohBus, free_endpoints
-
-OBSERVER = "launcher"
-"""The launcher listens to its team as an operator of this name."""
 
 STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """Any of these ends the run in order."""
@@ -52,17 +59,21 @@ class Course:
     """Why the run had to end, if it had to."""
 
 
-def run(file: Path, name: str | None, duration_s: float | None, console: Console) -> Course:
-    """Run a scenario with real processes until its time is over, or Ctrl-C, or a peer that nobody can replace is lost.
+def run(
+    file: Path, name: str | None, duration_s: float | None, console: Console, timetable: Path | None = None
+) -> Course:
+    """Run a scenario with real processes until its time is over, or Ctrl-C, or the agent is lost, whom nobody replaces.
 
     Args:
         file: the scenario.
         name: of the run, or None.
         duration_s: replaces the scenario's, unless None.
         console: where to say what happens.
+        timetable: file of faults that happen besides those of the scenario, or None.
 
     Raises:
-        ScenarioFault: the scenario cannot be run; nothing has been started then.
+        ScenarioFault: the scenario, or the timetable, cannot be run; nothing has been started then.
+        FaultyTimetable: the timetable does not fit.
     """
     tell(f"Checking {file} ...", console)
     with busy("Checking ..."):
@@ -76,6 +87,7 @@ def run(file: Path, name: str | None, duration_s: float | None, console: Console
     mission = structs.replace(
         mission, roster=roster, duration_s=duration_s or mission.duration_s, epoch_unix_s=time.time()
     )
+    faults = _faults(file, preparation, mission, timetable)
     folder = RunFolder.create(name, mission.team)
     folder.write(file, mission, preparation.environment)
     robots = f"{len(mission.robots)} robot" + "s" * (len(mission.robots) != 1)
@@ -84,13 +96,45 @@ def run(file: Path, name: str | None, duration_s: float | None, console: Console
         console,
     )
     course = Course(folder)
-    view = TeamView(mission, preparation.environment)
-    supervisor = Supervisor(mission, folder.path, preparation.planner, lambda text: tell(text, console), view.position)
+    names = [entry.name for entry in roster]
+    bodies = BodyPlaces(folder.path / BODIES, names, create=True)
+    links = LinkTable(folder.path / LINKS, names, create=True)
+    journal = Journal(mission, folder.path, console)
+    supervisor = Supervisor(mission, folder.path, preparation.planner, journal.tell, journal.crashed, bodies.get)
     stop = asyncio.Event()
     _launch(supervisor, stop)
     tell("Processes: " + ", ".join(f"{peer.name} {peer.pid}" for peer in supervisor.peers.values()), console)
-    asyncio.run(_accompany(mission, view, supervisor, course, stop, console))
+    team = Team(mission, TeamView(mission, preparation.environment), supervisor, links, journal)
+    try:
+        asyncio.run(_accompany(team, faults, course, stop, console))
+    finally:
+        journal.close()
     return course
+
+
+@dataclass(frozen=True)
+class Team:
+    """A running team, and what the launcher has of it."""
+
+    mission: Mission
+    view: TeamView
+    supervisor: Supervisor
+    links: LinkTable
+    journal: Journal
+
+
+def _faults(file: Path, preparation: Preparation, mission: Mission, timetable: Path | None) -> tuple[LiveFault, ...]:
+    """The faults of the scenario and of a file, held against the mission."""
+    names = [entry.name for entry in mission.roster]
+    try:
+        place, faults = file, check_live(Timetable(faults=preparation.scenario.faults), mission)
+        if timetable is not None:
+            place, faults = timetable, faults + check_live(read_timetable(timetable, names), mission)
+    except FaultyTimetable as problem:  # says its file
+        raise ScenarioFault(str(problem)) from problem
+    except ScenarioFault as problem:
+        raise ScenarioFault(f"{place}: {problem}") from problem
+    return faults
 
 
 def _launch(supervisor: Supervisor, stop: asyncio.Event) -> None:
@@ -127,22 +171,34 @@ def reserve_endpoints(file: Path, preparation: Preparation) -> list[str]:
 
 
 async def _accompany(
-    mission: Mission, view: TeamView, supervisor: Supervisor, course: Course, stop: asyncio.Event, console: Console
+    team: Team, faults: Sequence[LiveFault], course: Course, stop: asyncio.Event, console: Console
 ) -> None:
     """Watch the team until the end, or until it is to stop, then stop it."""
     loop = asyncio.get_running_loop()
     for number in STOPPING:
         loop.add_signal_handler(number, stop.set)
+    mission, view, supervisor = team.mission, team.view, team.supervisor
     inbox: Inbox[None] = Inbox()
     bus: ZenohBus | None = None
+
+    def mission_time() -> float:
+        return time.time() - mission.epoch_unix_s
+
+    def leader() -> str | None:
+        return view.leader(mission_time())
+
+    chaos = Chaos(mission, supervisor, team.links, leader, mission_time, team.journal.note)
     try:
         supervisor.watch()
         bus = ZenohBus.open(
             mission.team, OBSERVER, None, [entry.endpoint for entry in mission.roster], inbox.put, operator=True
         )
-        with _shown(mission, console) as show:
+        chaos.play(faults)
+        async with contextlib.AsyncExitStack() as stack:
+            await _take_orders(stack, chaos, mission, course.folder.path, console)
+            show = stack.enter_context(_shown(mission, console))
             while not stop.is_set():
-                now_s = time.time() - mission.epoch_unix_s
+                now_s = mission_time()
                 for event in inbox.wait(0.0):
                     if event is not None:
                         view.handle(event, now_s)
@@ -156,6 +212,7 @@ async def _accompany(
                     await asyncio.wait_for(stop.wait(), LOOK_S)
     finally:
         course.interrupted = stop.is_set()
+        chaos.close()
         try:
             tell("Stopping ...", console)
         finally:  # also when nobody reads what we print any more
@@ -164,6 +221,25 @@ async def _accompany(
             await supervisor.stop()
             if closing is not None:
                 await closing
+
+
+async def _take_orders(
+    stack: contextlib.AsyncExitStack, chaos: Chaos, mission: Mission, folder: Path, console: Console
+) -> None:
+    """Let people have faults happen, with ``sightline fault`` and with keys, until the stack is closed."""
+    names, robots = [entry.name for entry in mission.roster], [entry.name for entry in mission.robots]
+
+    def press(key: str) -> None:
+        order = order_of_key(key, robots)
+        if order is not None and not (answer := obey(order, chaos, names)).done:
+            tell(answer.text[:1].upper() + answer.text[1:], console)
+
+    try:
+        await stack.enter_async_context(listening(folder, lambda order: obey(order, chaos, names)))
+    except OSError as problem:
+        tell(f"Warning: `sightline fault` will not reach this run: {problem.strerror}", console, "yellow")
+    if console.is_terminal and stack.enter_context(hearing_keys(press)):
+        tell(KEYS, console)
 
 
 def _note_obedience(status: Status, mission: Mission, course: Course, console: Console) -> None:
@@ -175,11 +251,12 @@ def _note_obedience(status: Status, mission: Mission, course: Course, console: C
 
 
 def _irreplaceable_loss(supervisor: Supervisor, mission: Mission) -> str:
-    """A sentence if the base station or the agent has been given up."""
-    for entry in (mission.base_station, mission.tracked_agent):
-        if supervisor.peers[entry.name].given_up:
-            return f"the run ended because {entry.name} could not be kept alive"
-    return ""
+    """A sentence if the agent will not come back. Whoever else is lost, the others go on."""
+    agent = supervisor.peers[mission.tracked_agent.name]
+    if not agent.gone:
+        return ""
+    why = "could not be kept alive" if agent.given_up else "was killed for good"
+    return f"the run ended because {agent.name} {why}, and without it nothing is left to do"
 
 
 @contextlib.contextmanager

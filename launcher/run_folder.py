@@ -7,6 +7,10 @@
 ``versions.json``  of everything that took part
 ``recordings/``    one rerun file per process: ``<peer>.<incarnation>.rrd``
 ``logs/``          what the processes said, a file per peer
+``promises/``      what each voter has promised, and must remember when it is started again
+``bodies``         where each body stands (:mod:`agents.body_places`)
+``links``          what the links lose on purpose (:mod:`protocol.link_faults`)
+``control``        socket for ``sightline fault``, while the run lasts
 ``run.rrd``        the recordings in one file
 ``metrics.json``   the shares and counts
 =================  =====================================================================
@@ -34,6 +38,8 @@ from planning.environment import Environment
 
 RUNS = Path("runs")
 LATEST = "latest"
+RECORDINGS = "recordings"
+"""Folder of a run in which each process leaves its own file."""
 _LIBRARIES = ("eclipse-zenoh", "rerun-sdk", "numpy", "scipy", "numba", "shapely", "networkx", "msgspec")
 
 

@@ -24,6 +24,7 @@ from agents.leader import DeploymentPlanner
 from agents.mission import Mission
 from agents.voter_file import VoterFile
 from launcher.processes import fork_peer, spawn, wait_for_end
+from launcher.run_folder import RECORDINGS
 from protocol.messages import Point
 
 RESTARTS = 3
@@ -72,7 +73,8 @@ class Supervisor:
         mission: with endpoints.
         folder: of the run; holds ``mission.json``.
         planner: the team's, for forks.
-        announce: is told in a sentence what becomes of peers.
+        announce: is told in a sentence what else becomes of peers.
+        crashed: is told who crashed, and in a sentence what follows.
         find: where the body of a peer is; a mind that is restarted finds its body there.
     """
 
@@ -82,12 +84,14 @@ class Supervisor:
         folder: Path,
         planner: DeploymentPlanner,
         announce: Callable[[str], None],
+        crashed: Callable[[str, str], None],
         find: Callable[[str], Point | None],
     ) -> None:
         self.peers = {entry.name: Peer(entry.name) for entry in mission.roster}
         self._folder = folder
         self._planner = planner
         self._announce = announce
+        self._crashed = crashed
         self._find = find
         self._stopping = asyncio.Event()
         self._watchers: list[asyncio.Task[None]] = []
@@ -96,7 +100,7 @@ class Supervisor:
     def launch(self) -> None:
         """Start a process for every peer. Call it before there is an event loop, a bus or a thread: it forks."""
         (self._folder / "logs").mkdir(exist_ok=True)
-        (self._folder / "recordings").mkdir(exist_ok=True)
+        (self._folder / RECORDINGS).mkdir(exist_ok=True)
         for peer in self.peers.values():
             peer.pid = self.start_process(peer)
 
@@ -200,11 +204,12 @@ class Supervisor:
         how = f"was killed by {signal.Signals(-status).name}" if status < 0 else f"ended with status {status}"
         if len(peer.crashes) > RESTARTS:
             peer.given_up = True
-            self._announce(
+            self._crashed(
+                peer.name,
                 f"{peer.name} {how}, the {len(peer.crashes)}th time within {STEADY_S:g} s: given up; "
-                f"see {self.log(peer)}"
+                f"see {self.log(peer)}",
             )
             return None
-        self._announce(f"{peer.name} {how}; restarting it ({len(peer.crashes)} of {RESTARTS})")
+        self._crashed(peer.name, f"{peer.name} {how}; restarting it ({len(peer.crashes)} of {RESTARTS})")
         # The jitter keeps peers that crashed together from coming back together; nothing is reproducible here.
         return BACKOFF_S * 2.0 ** (len(peer.crashes) - 1) * (1.0 + random.random())

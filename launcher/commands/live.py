@@ -1,11 +1,11 @@
-"""``demo``, ``run`` and ``goal``: teams of real processes."""
+"""``demo``, ``run``, ``goal`` and ``fault``: teams of real processes."""
 
 from __future__ import annotations
 
 import shutil
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -34,10 +34,13 @@ def run(
     scenario: Annotated[str, typer.Argument(help="A TOML file, or the name of a scenario that comes with Sightline.")],
     name: Name = None,
     duration_s: Duration = None,
+    chaos: Annotated[
+        Path | None, typer.Option(help="TOML file of faults that happen on a timetable, besides the scenario's own.")
+    ] = None,
 ) -> None:
     """Run a scenario with a process for each peer, watch it live, and leave a recording in runs/."""
     with plainly():
-        _run(find_scenario(scenario), name, duration_s)
+        _run(find_scenario(scenario), name, duration_s, chaos)
 
 
 def goal(
@@ -56,12 +59,39 @@ def goal(
         tell(f"The agent goes to {x:g}, {y:g}.")
 
 
-def _run(file: Path, name: str | None, duration_s: float | None) -> None:
+def fault(
+    run: Annotated[str, typer.Argument(metavar="RUN", help="Folder or name of a run, or latest.")],
+    action: Annotated[
+        Literal["kill", "pause", "cut", "heal"], typer.Argument(metavar="ACTION", help="kill, pause, cut or heal.")
+    ],
+    who: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[PEER]...",
+            help="A name on the roster, or leader; cut: one to cut off, or two; heal: all if none is named.",
+        ),
+    ] = None,
+    for_s: Annotated[
+        float | None, typer.Option("--for", help="Seconds; else killed and cut for good, paused for 3 s.")
+    ] = None,
+) -> None:
+    """Have something go wrong in a running team: kill or pause a peer's process, cut its links, or heal them."""
+    from launcher.chaos_control import Order, give_order
+    from launcher.run_folder import RunFolder
+
+    with plainly():
+        check_option("--for", for_s, 0.05, LONGEST_S, "seconds")
+        folder = RunFolder.find(run)
+        order = Order(action=action, who=tuple(who or ()), for_s=for_s)
+        tell(give_order(folder, folder.read_mission(), order) + ".")
+
+
+def _run(file: Path, name: str | None, duration_s: float | None, chaos: Path | None = None) -> None:
     """Run, then merge, measure and say where everything is."""
     check_option("--duration", duration_s, 1, LONGEST_S, "seconds")
     from launcher.run import run as run_team
 
-    course = run_team(file, name, duration_s, out)
+    course = run_team(file, name, duration_s, out, chaos)
     failures = [*_conclude(course).failures, *([course.failure] if course.failure else [])]
     for failure in failures:
         complain(failure)

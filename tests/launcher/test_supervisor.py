@@ -40,7 +40,9 @@ def rehearse(mission: Mission, tmp_path: Path) -> Callable[[dict[str, str]], tup
     def make(scripts: dict[str, str]) -> tuple[Rehearsal, list[str]]:
         said: list[str] = []
         planner = DeploymentPlanner(ROOM, (1.0, 1.0), 0.2, "inflection")
-        team = Rehearsal(mission, tmp_path, planner, said.append, lambda _: (1.5, -2.5))
+        team = Rehearsal(
+            mission, tmp_path, planner, said.append, lambda _, text: said.append(text), lambda _: (1.5, -2.5)
+        )
         team.scripts = scripts
         return team, said
 

@@ -1,0 +1,56 @@
+"""What the launcher itself has to say of a run: on the console, and in the recording."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Final
+
+from rich.console import Console
+
+from agents.mission import Mission
+from agents.recorder import RerunRecorder
+from agents.records import Mishap
+from launcher.console import tell
+from launcher.run_folder import RECORDINGS
+
+OBSERVER: Final = "launcher"
+"""The launcher listens to its team as an operator of this name, and records under it."""
+
+
+class Journal:
+    """Says and records. The file begins with the first record: until the team has been forked it must not exist.
+
+    Args:
+        mission: its team and its time.
+        folder: of the run.
+        console: where to say things.
+    """
+
+    def __init__(self, mission: Mission, folder: Path, console: Console) -> None:
+        self._mission = mission
+        self._folder = folder
+        self._console = console
+        self._recorder: RerunRecorder | None = None
+
+    def tell(self, text: str) -> None:
+        """Say something of no importance to the recording."""
+        tell(text, self._console)
+
+    def crashed(self, peer: str, text: str) -> None:
+        """A process ended that nobody wanted to end."""
+        self.note(Mishap(kind="crash", who=(peer,), text=text))
+
+    def note(self, mishap: Mishap) -> None:
+        """Say and record what befell the team."""
+        now_s = time.time() - self._mission.epoch_unix_s
+        tell(f"{now_s:6.1f} s  {mishap.text}", self._console)
+        if self._recorder is None:
+            file = self._folder / RECORDINGS / f"{OBSERVER}.0.rrd"
+            self._recorder = RerunRecorder(file, team=self._mission.team, recording_id=self._folder.name, peer=OBSERVER)
+        self._recorder.record(now_s, OBSERVER, mishap)
+
+    def close(self) -> None:
+        """Finish the file, if there is one."""
+        if self._recorder is not None:
+            self._recorder.close()
