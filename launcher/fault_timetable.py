@@ -49,6 +49,11 @@ class _Fault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     for_s: Duration | None = None
 
     @property
+    def kind(self) -> str:
+        """As in the file."""
+        return str(self.__struct_config__.tag)
+
+    @property
     def ends_s(self) -> float:
         """Mission time at which it is over."""
         return math.inf if self.for_s is None else self.at_s + self.for_s
@@ -77,6 +82,10 @@ class Kill(_PeerFault, frozen=True, kw_only=True, tag="kill"):
 
 class Pause(_PeerFault, frozen=True, kw_only=True, tag="pause"):
     """The process stands still as after SIGSTOP; then all that has arrived is there at once."""
+
+    speaking: bool = False
+    """Whether, in virtual time, it is stopped in the middle of its next sentence: what it has decided to say is heard
+    when the pause is over."""
 
 
 class Partition(_Fault, frozen=True, kw_only=True, tag="partition"):
@@ -144,6 +153,7 @@ class Clock(_PeerFault, frozen=True, kw_only=True, tag="clock"):
 
 
 Fault: TypeAlias = Kill | Pause | Partition | Cut | Loss | Delay | Duplicate | Corrupt | Disk | Clock
+PeerFault: TypeAlias = Kill | Pause | Disk | Clock
 LinkFault: TypeAlias = Cut | Loss | Delay | Duplicate | Corrupt
 
 
@@ -214,7 +224,7 @@ def write_timetable(timetable: Timetable) -> str:
     """TOML text of a timetable, which reads back as the same one; faults in order of time, defaults left out."""
     blocks = []
     for fault in sorted(timetable.faults, key=lambda fault: fault.at_s):
-        lines = ["[[faults]]", f'kind = "{fault.__struct_config__.tag}"']
+        lines = ["[[faults]]", f'kind = "{fault.kind}"']
         for key, default in zip(fault.__struct_fields__, _defaults(fault), strict=True):
             value = getattr(fault, key)
             if value != default:
@@ -229,8 +239,8 @@ def describe(fault: Fault) -> str:
     match fault:
         case Kill(who=who, disk=disk):
             return f"{who} is killed{', its disk lost,' if disk == 'lost' else ''}{for_s}"
-        case Pause(who=who):
-            return f"{who} is paused{for_s}"
+        case Pause(who=who, speaking=speaking):
+            return f"{who} is paused{' in the middle of a sentence' if speaking else ''}{for_s}"
         case Partition(group=group):
             return f"{', '.join(group)} cut off from all others{for_s}"
         case Disk(who=who, takes_s=takes_s, full=full):

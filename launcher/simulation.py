@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
@@ -12,11 +11,11 @@ from msgspec import structs
 from agents.casting import Casting
 from agents.mission import Mission
 from agents.records import AnyRecord
-from agents.role import Compute, JobDone, Persist, Written
-from agents.shell import PeerShell
+from launcher.fault_injection import FaultInjection
+from launcher.fault_timetable import Timetable
 from launcher.mission_trace import MissionTrace
+from launcher.simulated_peer import SimulatedPeer
 from planning.environment import Environment
-from protocol.bus import BusEvent
 from protocol.simulated_bus import SimulatedNetwork, VirtualTime
 
 if TYPE_CHECKING:
@@ -26,84 +25,58 @@ if TYPE_CHECKING:
 UNTIL_TOLD_S: Final = 60.0
 """Duration of a mission that sets none."""
 
-WRITING_S: Final = 0.005
-"""How long a disk takes to keep a promise."""
+WORLD: Final = "launcher"
+"""Who records what goes wrong on purpose."""
 
 
-class SimulatedPeer:
-    """A peer in virtual time: sleeps until it is due, computes inline and lets the result wait for its delay."""
+class SimulatedTeam:
+    """All peers of a mission on one network, with one true time; nothing has happened yet.
+
+    Args:
+        mission: the same that processes would read.
+        casting: gives the peers their roles and bodies.
+        record: takes what they record: true time, name, record.
+        faults: what goes wrong when, held against the roster (:func:`launcher.fault_timetable.checked`).
+        loss: probability that a peer misses a message, on sound links too.
+        watch: called with a peer after each event that it has handled.
+    """
 
     def __init__(
         self,
-        time: VirtualTime,
-        network: SimulatedNetwork,
-        casting: Casting,
         mission: Mission,
-        name: str,
+        casting: Casting,
         record: Callable[[float, str, AnyRecord], None],
+        *,
+        faults: Timetable | None = None,
+        loss: float = 0.0,
+        watch: Callable[[SimulatedPeer], None] | None = None,
     ) -> None:
-        self._time = time
-        self._network = network
-        self._mission = mission
-        self._name = name
-        self._record = record
-        self._role, self._driver = casting.cast(name)
-        self._due_s = math.inf
-
-    def start(self) -> None:
-        """Join the network and let the role begin."""
-        self._shell = PeerShell(
-            self._role,
-            self._driver,
-            self._network.attach(self._name, self._take, kinds=self._role.hears),
-            name=self._name,
-            team=self._mission.team,
-            incarnation=0,
-            peers=[entry.name for entry in self._mission.roster],
-            now=lambda: self._time.now_s,
-            wall_clock=lambda: self._mission.epoch_unix_s + self._time.now_s,
-            record=lambda time_s, record: self._record(time_s, self._name, record),
-            execute=self._execute,
-            persist=self._persist,
+        self.time = time = VirtualTime()
+        self.network = SimulatedNetwork(time, mission.seed, loss=loss)
+        self.peers = {
+            entry.name: SimulatedPeer(time, self.network, casting, mission, entry.name, record, watch)
+            for entry in mission.roster
+        }
+        self.faults = FaultInjection(
+            time,
+            self.network,
+            self.peers,
+            faults or Timetable(),
+            self.leader,
+            lambda mishap: record(time.now_s, WORLD, mishap),
         )
-        self._shell.start()
-        self._sleep()
+        # Processes do not beat in step; here the seed says by how much they differ.
+        chance = np.random.default_rng([mission.seed, len(self.peers)])
+        phases_s = chance.uniform(0.0, 1.0 / mission.control_hz, len(self.peers))
+        for peer, phase_s in zip(self.peers.values(), phases_s, strict=True):
+            time.call_at(float(phase_s), peer.start)
 
-    def _take(self, event: BusEvent) -> None:
-        self._shell.take(event)
-        self._sleep()
-
-    def _execute(self, job: Compute) -> None:
-        result, failure = None, ""
-        try:
-            result = job.function(*job.arguments)
-        except Exception as problem:
-            failure = f"{type(problem).__name__}: {problem}"
-        delay_s = self._mission.planning_delay_s
-        self._time.call_at(self._time.now_s + delay_s, self._finish, JobDone(job.job, result, delay_s, failure))
-
-    def _persist(self, content: Persist) -> None:
-        self._time.call_at(self._time.now_s + WRITING_S, self._wrote, Written(content.token))
-
-    def _wrote(self, written: Written) -> None:
-        self._shell.written(written)
-        self._sleep()
-
-    def _finish(self, done: JobDone) -> None:
-        self._shell.finish(done)
-        self._sleep()
-
-    def _sleep(self) -> None:
-        """Have :meth:`_wake` called when the shell is due; calls for times no longer wished for find that out."""
-        if self._shell.wake_at_s != self._due_s:
-            self._due_s = self._shell.wake_at_s
-            self._time.call_at(self._due_s, self._wake, self._due_s)
-
-    def _wake(self, due_s: float) -> None:
-        if due_s == self._due_s:
-            self._due_s = math.inf
-            self._shell.wake()
-            self._sleep()
+    def leader(self) -> str | None:
+        """Who holds an unexpired lease now."""
+        for name, peer in self.peers.items():
+            if peer.allegiance is not None and peer.allegiance.leads(peer.now_s):
+                return name
+        return None
 
 
 def simulate(
@@ -114,6 +87,7 @@ def simulate(
     duration_s: float | None = None,
     seed: int | None = None,
     loss: float = 0.0,
+    faults: Timetable | None = None,
     planner: DeploymentPlanner | None = None,
 ) -> MissionTrace:
     """Run a mission in virtual time.
@@ -125,6 +99,7 @@ def simulate(
         duration_s: instead of the mission's; 60 s if neither says.
         seed: instead of the mission's. Equal seeds give equal traces, to the last bit.
         loss: probability that a peer misses a message.
+        faults: what goes wrong when; names are those of the roster (:func:`launcher.fault_timetable.checked`).
         planner: of a mission that differs in its seed only; saves building another.
 
     Returns:
@@ -144,13 +119,6 @@ def simulate(
         if recorder is not None:
             recorder.record(time_s, peer, what)
 
-    time = VirtualTime()
-    network = SimulatedNetwork(time, mission.seed, loss=loss)
-    casting = Casting(mission, environment, planner)
-    peers = [SimulatedPeer(time, network, casting, mission, entry.name, record) for entry in mission.roster]
-    # Processes do not beat in step; here the seed says by how much they differ.
-    phases_s = np.random.default_rng([mission.seed, len(peers)]).uniform(0.0, 1.0 / mission.control_hz, len(peers))
-    for peer, phase_s in zip(peers, phases_s, strict=True):
-        time.call_at(float(phase_s), peer.start)
-    time.run_until(ends_s)
+    team = SimulatedTeam(mission, Casting(mission, environment, planner), record, faults=faults, loss=loss)
+    team.time.run_until(ends_s)
     return MissionTrace.of(records, mission, ends_s)

@@ -128,10 +128,11 @@ class SimulatedNetwork:
         """Publications that were put on a link, counted once for each time that one arrives."""
         self.lost = 0
         """Publications that chance or a cut took, counted once for each receiver."""
+        self.usual = LinkFaults(loss=loss) if loss else SOUND
+        """What is wrong with every link."""
         self._time = time
         self._seed = seed
         self._delays = Delays(delay_s[0], 0.5 * (delay_s[1] - delay_s[0]))
-        self._usual = LinkFaults(loss=loss) if loss else SOUND
         self._attachments = 0
         self._attached: dict[str, SimulatedBus] = {}
         self._links: dict[tuple[str, str], Link] = {}
@@ -172,7 +173,7 @@ class SimulatedNetwork:
         Tokens that went or came while it was cut are seen to have done so as soon as it is not.
         """
         link = self._link(speaker, hearer)
-        link.faults = self._usual if faults is None else faults
+        link.faults = self.usual if faults is None else faults
         if hearer in self._attached:
             self._show_token(speaker, self._attached[hearer])
 
@@ -238,5 +239,5 @@ class SimulatedNetwork:
         link = self._links.get((speaker, hearer))
         if link is None:
             link = self._links[speaker, hearer] = Link(f"{self._seed}/{speaker}/{hearer}", self._delays)
-            link.faults = self._usual
+            link.faults = self.usual
         return link

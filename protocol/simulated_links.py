@@ -137,4 +137,4 @@ def _corrupt(publication: Received, luck: Random) -> Received:
         decode(bytes(payload))
     except MalformedMessage:
         return Received(publication.key, bytes(payload))
-    return Received(publication.key, bytes(payload[:-1]))
+    return Received(publication.key, b"\xff" + payload)

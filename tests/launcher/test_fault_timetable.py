@@ -35,7 +35,8 @@ def values(kind: type) -> st.SearchStrategy[Fault]:
         "who": st.sampled_from(("agent", "leader")),
         "speakers": names | st.just(()), "hearers": names | st.just(()), "share": shares, "burst": st.floats(1.0, 9.0),
         "least_s": shares, "mean_s": shares, "tail": st.sampled_from(("uniform", "exponential", "log-normal")),
-        "spikes": shares, "spike_s": shares, "overtaking": st.booleans(), "takes_s": shares, "full": st.booleans(),
+        "spikes": shares, "spike_s": shares, "overtaking": st.booleans(),
+        "speaking": st.booleans(), "takes_s": shares, "full": st.booleans(),
         "rate": st.floats(0.9, 1.1), "offset_s": st.floats(-9.0, 9.0),
     }  # fmt: skip
     fields = {field: known[field] for field in kind.__struct_fields__}  # type: ignore[attr-defined]

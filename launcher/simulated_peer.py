@@ -1,0 +1,326 @@
+"""A peer in virtual time, and what can happen to one: it dies, hangs and comes back; its clock and disk are its own.
+
+The role, its shell and its body are those of the live system. The process is not: it sleeps until it is due, computes
+inline and lets the result wait for its delay.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from copy import copy
+from random import Random
+from typing import TYPE_CHECKING, Final, TypeVar
+
+from agents.allegiance import Allegiance
+from agents.records import AnyRecord
+from agents.role import Compute, JobDone, Persist, Role, Written
+from agents.shell import PeerShell
+from protocol.bus import BusEvent
+from protocol.inbox import Inbox
+
+if TYPE_CHECKING:
+    from agents.casting import Casting
+    from agents.driver import DiscDriver
+    from agents.mission import Mission
+    from protocol.messages import Point
+    from protocol.simulated_bus import SimulatedNetwork, VirtualTime
+
+APart = TypeVar("APart")
+
+WRITING_S: Final = 0.003
+"""How long a sound disk takes to keep a promise."""
+
+
+class SimulatedClock:
+    """What a peer reads for the time: another zero, another rate. Never steps back."""
+
+    def __init__(self) -> None:
+        self.rate = 1.0
+        """Its seconds in a true one."""
+        self._true_s = self._shown_s = 0.0
+
+    def read(self, true_s: float) -> float:
+        """What it shows."""
+        return self._shown_s + self.rate * (true_s - self._true_s)
+
+    def when(self, shown_s: float) -> float:
+        """True time from which on it shows at least this; for now or later."""
+        true_s = self._true_s + (shown_s - self._shown_s) / self.rate
+        while self.read(true_s) < shown_s:  # it rounds
+            true_s = math.nextafter(true_s, math.inf)
+        return true_s
+
+    def change(self, rate: float, true_s: float, ahead_s: float | None = None) -> None:
+        """Run at another rate from now on; step ahead of true time by so much, if that is given."""
+        self._shown_s = self.read(true_s) if ahead_s is None else true_s + ahead_s
+        self._true_s, self.rate = true_s, rate
+
+
+class SimulatedDisk:
+    """Keeps the last content written, whole or not at all. What has been acknowledged stays when the power fails.
+
+    Args:
+        time: the clock that completions are put on.
+        seed: of what becomes of a write that is under way when the power fails.
+    """
+
+    def __init__(self, time: VirtualTime, seed: str) -> None:
+        self.content: bytes | None = None
+        self.takes_s = WRITING_S
+        self.full = False
+        self._time = time
+        self._chance = Random(seed)
+        self._under_way: dict[int, bytes] = {}
+        self._writes = 0
+
+    def write(self, what: Persist, done: Callable[[Written], None]) -> None:
+        """Put this in place of what is there, which takes a while; then say so."""
+        self._writes += 1
+        if not self.full:
+            self._under_way[self._writes] = what.content
+        self._time.call_at(self._time.now_s + self.takes_s, self._finish, self._writes, what.token, self.full, done)
+
+    def fail(self) -> None:
+        """The power is gone: what is under way may have been written, or not."""
+        for content in self._under_way.values():
+            if self._chance.random() < 0.5:
+                self.content = content
+        self._under_way.clear()
+
+    def _finish(self, write: int, token: int, full: bool, done: Callable[[Written], None]) -> None:
+        content = self._under_way.pop(write, None)
+        if content is not None:
+            self.content = content
+            done(Written(token))
+        elif full:
+            done(Written(token, "no space left on device"))
+
+
+class SimulatedPeer:
+    """One process after another under one name, with one body, one clock and one disk.
+
+    Args:
+        time: true time.
+        network: of the team.
+        casting: gives it a role, and a body.
+        mission: its name is on the roster of it.
+        name: of this peer.
+        record: takes what it records: true time, name, record.
+        watch: called after each event that it has handled.
+    """
+
+    def __init__(
+        self,
+        time: VirtualTime,
+        network: SimulatedNetwork,
+        casting: Casting,
+        mission: Mission,
+        name: str,
+        record: Callable[[float, str, AnyRecord], None],
+        watch: Callable[[SimulatedPeer], None] | None = None,
+    ) -> None:
+        self.name = name
+        self.clock = SimulatedClock()
+        self.disk = SimulatedDisk(time, f"{mission.seed}/{name}/disk")
+        self.shell: PeerShell | None = None
+        """Of the process that runs; None: there is none."""
+        self.role: Role | None = None
+        self.allegiance: Allegiance | None = None
+        """Of its role, if that has one."""
+        self.incarnation = -1
+        """Of the latest process."""
+        self.said: Callable[[SimulatedPeer, str, bytes], None] | None = None
+        """Called with key and payload of everything that it says, before anybody hears it."""
+        self._time, self._network = time, network
+        self._casting, self._mission = casting, mission
+        self._record, self._watch = record, watch
+        self._body: DiscDriver | None = None
+        self._due_s = math.inf
+        self._waiting: Inbox[JobDone | Written] | None = None
+        """What arrives while it is paused; None while it is not."""
+        self._held: list[tuple[str, bytes]] | None = None
+        """What it is about to say; it has been paused in the middle of a sentence, or will be."""
+
+    @property
+    def runs(self) -> bool:
+        """Whether there is a process, and it is not paused."""
+        return self.shell is not None and self._waiting is None
+
+    @property
+    def now_s(self) -> float:
+        """What its clock shows."""
+        return self.clock.read(self._time.now_s)
+
+    @property
+    def place(self) -> Point:
+        """Where its body truly is now."""
+        if self._body is None:
+            return self._mission.entry(self.name).start
+        body = copy(self._body)  # looking at it must change nothing
+        body.advance(self._time.now_s)
+        return body.pose()
+
+    def start(self) -> None:
+        """Begin a process where there is none: it joins the network, and its role begins."""
+        if self.shell is not None:
+            return
+        self.incarnation += 1
+        role, body = self._casting.cast(self.name)
+        self._body = body = self._body or body
+        self.role, self.allegiance = role, part_of(role, Allegiance)
+        self._bus = self._network.attach(self.name, self._take, kinds=role.hears)
+        self.shell = shell = PeerShell(
+            role,
+            _TrueBody(body, self._time),
+            self,
+            name=self.name,
+            team=self._mission.team,
+            incarnation=self.incarnation,
+            peers=[entry.name for entry in self._mission.roster],
+            now=lambda: self.now_s,
+            wall_clock=lambda: self._mission.epoch_unix_s + self.now_s,
+            record=lambda _, record: self._record(self._time.now_s, self.name, record),
+            execute=self._execute,
+            persist=self._persist,
+        )
+        shell.start()
+        self._sleep()
+
+    def kill(self, *, lose_disk: bool = False, noticed_after_s: float = 0.0) -> None:
+        """End the process at once; its body stands when its last command has run out.
+
+        Args:
+            lose_disk: what it has written is gone.
+            noticed_after_s: the others see its token vanish so much later.
+        """
+        if self.shell is not None:
+            self.disk.fail()
+            self._bus.close(noticed_after_s)
+            self.shell = self.role = self.allegiance = self._waiting = self._held = None
+            self._due_s = math.inf
+        if lose_disk:
+            self.disk.content = None
+
+    def pause(self, *, speaking: bool = False) -> None:
+        """Stop the process as SIGSTOP does.
+
+        Args:
+            speaking: not now, but when it has dealt with its next event, before what it then says has gone out.
+        """
+        if self.shell is not None and self._waiting is None:
+            if speaking:
+                self._held = []
+            else:
+                self._waiting = Inbox()
+
+    def resume(self) -> None:
+        """Let the process go on as SIGCONT does: it ends its sentence, looks at what has arrived, then at the clock."""
+        held, self._held = self._held, None
+        waiting, self._waiting = self._waiting, None
+        for key, payload in held or ():
+            self._bus.publish(key, payload)
+        for event in waiting.wait(0.0) if waiting is not None else ():
+            self._pass_on(event)
+        self._sleep()
+        self._wake(self._due_s)
+
+    def set_clock(self, rate: float, ahead_s: float | None = None) -> None:
+        """Let the clock run at another rate; a clock in use does not jump."""
+        self.clock.change(rate, self._time.now_s, ahead_s if self.shell is None else None)
+        self._due_s = math.inf
+        self._sleep()
+
+    def publish(self, key: str, payload: bytes) -> None:
+        """The bus of its shell."""
+        if self.said is not None:
+            self.said(self, key, payload)
+        if self._held is None:
+            self._bus.publish(key, payload)
+        else:
+            self._held.append((key, payload))
+
+    def close(self) -> None:
+        """The bus of its shell; it is closed by :meth:`kill`."""
+
+    def _take(self, event: BusEvent) -> None:
+        if self._waiting is None:
+            self._pass_on(event)
+        else:
+            self._waiting.put(event)
+
+    def _come_back(self, incarnation: int, event: JobDone | Written) -> None:
+        """Pass on the end of what a process has begun, if that is the one that runs."""
+        if self.shell is None or self.incarnation != incarnation:
+            return
+        if self._waiting is None:
+            self._pass_on(event)
+        else:
+            self._waiting.put(event)
+
+    def _pass_on(self, event: BusEvent | JobDone | Written) -> None:
+        shell = self.shell
+        assert shell is not None
+        match event:
+            case JobDone():
+                shell.finish(event)
+            case Written():
+                shell.written(event)
+            case _:
+                shell.take(event)
+        self._end_event()
+
+    def _end_event(self) -> None:
+        if self._held is not None and self._waiting is None:
+            self._waiting = Inbox()
+        if self._watch is not None:
+            self._watch(self)
+        self._sleep()
+
+    def _execute(self, job: Compute) -> None:
+        result, failure = None, ""
+        try:
+            result = job.function(*job.arguments)
+        except Exception as problem:
+            failure = f"{type(problem).__name__}: {problem}"
+        delay_s = self._mission.planning_delay_s
+        done = JobDone(job.job, result, delay_s, failure)
+        self._time.call_at(self._time.now_s + delay_s, self._come_back, self.incarnation, done)
+
+    def _persist(self, what: Persist) -> None:
+        incarnation = self.incarnation
+        self.disk.write(what, lambda written: self._come_back(incarnation, written))
+
+    def _sleep(self) -> None:
+        """Have :meth:`_wake` called when the shell is due; calls for times no longer wished for find that out."""
+        if self.shell is not None and self._waiting is None and self.shell.wake_at_s != self._due_s:
+            self._due_s = self.shell.wake_at_s
+            self._time.call_at(self.clock.when(self._due_s), self._wake, self._due_s)
+
+    def _wake(self, due_s: float) -> None:
+        if self.runs and due_s == self._due_s and self.now_s >= due_s:
+            assert self.shell is not None
+            self._due_s = math.inf
+            self.shell.wake()
+            self._end_event()
+
+
+def part_of(role: Role, kind: type[APart]) -> APart | None:
+    """The part of this kind of a role that is composed of parts; None if it has none."""
+    return next((part for part in getattr(role, "parts", ()) if isinstance(part, kind)), None)
+
+
+class _TrueBody:
+    """A body as the mind has it, which moves by true time whatever the mind's clock shows."""
+
+    def __init__(self, body: DiscDriver, time: VirtualTime) -> None:
+        self._body, self._time = body, time
+
+    def advance(self, _now_s: float) -> None:
+        self._body.advance(self._time.now_s)
+
+    def pose(self) -> Point:
+        return self._body.pose()
+
+    def drive(self, velocity: Point, for_s: float) -> None:
+        self._body.drive(velocity, for_s)
