@@ -173,7 +173,9 @@ def live(
     bodies = BodyPlaces(folder / BODIES, peers) if (folder / BODIES).exists() else None
     deliver: Deliver = inbox.put
     if (folder / LINKS).exists():
-        deliver = LinkFilter(LinkTable(folder / LINKS, peers), name, inbox.put, mission.seed).deliver
+        links = LinkFilter(LinkTable(folder / LINKS, peers), name, inbox.put, mission.seed)
+        links.watch()
+        deliver = links.deliver
     bus = ZenohBus.open(mission.team, name, mission.entry(name).endpoint, endpoints, deliver)
     try:
         shell = PeerShell(

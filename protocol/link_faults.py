@@ -76,7 +76,7 @@ class LinkTable:
 
 
 class LinkFilter:
-    """Stands before a peer's ``deliver`` and lets pass what the table lets pass. Ends with the process.
+    """Stands before a peer's ``deliver`` and lets pass what the table lets pass.
 
     Args:
         table: of the links.
@@ -96,6 +96,9 @@ class LinkFilter:
         self._shown: set[str] = set()
         """Those of them that the peer knows of."""
         self._cut_since_s: dict[str, float] = {}
+
+    def watch(self) -> None:
+        """Look at the table again and again from now on, in a thread that ends with the process."""
         threading.Thread(target=self._watch, name="links", daemon=True).start()
 
     def deliver(self, event: BusEvent) -> None:
