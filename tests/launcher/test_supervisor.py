@@ -13,6 +13,7 @@ import pytest
 
 from agents.leader import DeploymentPlanner
 from agents.mission import Mission
+from agents.voter_file import VoterFile
 from launcher import supervisor as supervision
 from launcher.processes import spawn
 from launcher.supervisor import Peer, Supervisor
@@ -142,3 +143,60 @@ def test_a_stop_during_the_pause_before_a_restart_starts_nothing(
     asyncio.run(play())
     assert team.peers["robot1"].incarnation == 0
     assert len(said) == 1
+
+
+def state_of(pid: int) -> str:
+    """``T``: stopped."""
+    return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+
+
+def test_who_is_killed_on_purpose_comes_back_when_it_is_to_and_that_is_no_crash(
+    rehearse: Callable[[dict[str, str]], tuple[Rehearsal, list[str]]], tmp_path: Path
+) -> None:
+    team, said = rehearse({"robot1": "import sys; print(sys.argv[1], flush=True); import time; time.sleep(60)"})
+    promise = VoterFile(tmp_path, "robot1").path
+    promise.parent.mkdir()
+    promise.touch()
+
+    async def play() -> None:
+        team.launch()
+        team.watch()
+        for incarnation in range(supervision.RESTARTS + 2):
+            await until(lambda: len(logged(tmp_path, "robot1")) > incarnation)  # noqa: B023
+            assert team.kill("robot1", 0.01, lose_disk=incarnation == 1)
+            assert promise.exists() == (incarnation < 2)
+        assert team.kill("base", None)
+        await until(lambda: team.peers["base"].pid is None)
+        assert team.peers["base"].gone
+        assert not team.kill("base", 1.0), "what has no process cannot be killed"
+        assert not team.pause("base", 1.0)
+        await until(lambda: len(logged(tmp_path, "robot1")) == supervision.RESTARTS + 3)
+        await team.stop()
+
+    asyncio.run(play())
+    assert said == []
+    assert not team.peers["robot1"].gone
+
+
+def test_a_paused_peer_goes_on_by_itself_and_can_be_stopped_in_order(
+    rehearse: Callable[[dict[str, str]], tuple[Rehearsal, list[str]]], tmp_path: Path
+) -> None:
+    team, said = rehearse({})
+
+    async def play() -> None:
+        team.launch()
+        team.watch()
+        await until(lambda: all(logged(tmp_path, name) for name in team.peers))
+        brief, long = (team.peers[name].pid for name in ("robot1", "robot2"))
+        assert brief is not None
+        assert long is not None
+        assert team.pause("robot1", 0.2)
+        assert team.pause("robot2", 60.0)
+        assert not team.pause("robot1", 60.0), "it is paused already"
+        await until(lambda: state_of(brief) == state_of(long) == "T")
+        await until(lambda: state_of(brief) != "T")
+        assert state_of(long) == "T"
+        await team.stop()
+
+    asyncio.run(play())
+    assert said == []
