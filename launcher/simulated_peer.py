@@ -18,6 +18,7 @@ from agents.role import Compute, JobDone, Persist, Role, Written
 from agents.shell import PeerShell
 from protocol.bus import BusEvent
 from protocol.inbox import Inbox
+from protocol.promises import decode_promise
 
 if TYPE_CHECKING:
     from agents.casting import Casting
@@ -166,13 +167,20 @@ class SimulatedPeer:
         if self.shell is not None:
             return
         self.incarnation += 1
-        role, body = self._casting.cast(self.name)
+        promise = decode_promise(
+            self.disk.content,
+            file=f"the simulated disk of {self.name}",
+            team=self._mission.team,
+            voter=self.name,
+            incarnation=self.incarnation,
+        )
+        role, body = self._casting.cast(self.name, incarnation=self.incarnation, promise=promise, now_s=self.now_s)
         self._body = body = self._body or body
         self.role, self.allegiance = role, part_of(role, Allegiance)
         self._bus = self._network.attach(self.name, self._take, kinds=role.hears)
         self.shell = shell = PeerShell(
             role,
-            _TrueBody(body, self._time),
+            _TrueBody(body, self._time, self.clock),
             self,
             name=self.name,
             team=self._mission.team,
@@ -311,10 +319,10 @@ def part_of(role: Role, kind: type[APart]) -> APart | None:
 
 
 class _TrueBody:
-    """A body as the mind has it, which moves by true time whatever the mind's clock shows."""
+    """A body as the mind has it: it moves by true time, and never for longer than it was told by either clock."""
 
-    def __init__(self, body: DiscDriver, time: VirtualTime) -> None:
-        self._body, self._time = body, time
+    def __init__(self, body: DiscDriver, time: VirtualTime, clock: SimulatedClock) -> None:
+        self._body, self._time, self._clock = body, time, clock
 
     def advance(self, _now_s: float) -> None:
         self._body.advance(self._time.now_s)
@@ -323,4 +331,4 @@ class _TrueBody:
         return self._body.pose()
 
     def drive(self, velocity: Point, for_s: float) -> None:
-        self._body.drive(velocity, for_s)
+        self._body.drive(velocity, min(for_s, for_s / self._clock.rate))

@@ -173,6 +173,8 @@ class SimulatedNetwork:
         Tokens that went or came while it was cut are seen to have done so as soon as it is not.
         """
         link = self._link(speaker, hearer)
+        if link.faults.delays is not None and (faults is None or faults.delays is None):
+            link.heal()
         link.faults = self.usual if faults is None else faults
         if hearer in self._attached:
             self._show_token(speaker, self._attached[hearer])
@@ -233,7 +235,7 @@ class SimulatedNetwork:
 
     def _send(self, link: Link, receiver: SimulatedBus, event: BusEvent) -> None:
         """Put a token on a link, behind what is on its way there."""
-        self._time.call_at(link.carry(self._time.now_s), receiver._arrive, event)
+        self._time.call_at(link.carry_token(self._time.now_s), receiver._arrive, event)
 
     def _link(self, speaker: str, hearer: str) -> Link:
         link = self._links.get((speaker, hearer))

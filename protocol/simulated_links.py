@@ -73,7 +73,18 @@ class Link:
         delays: while it is sound; uniform ones.
     """
 
-    __slots__ = ("_chance", "_delays", "_last_arrival_s", "_losing", "_luck", "_name", "_spread_s", "faults", "token")
+    __slots__ = (
+        "_chance",
+        "_delays",
+        "_last_arrival_s",
+        "_last_token_s",
+        "_losing",
+        "_luck",
+        "_name",
+        "_spread_s",
+        "faults",
+        "token",
+    )
 
     def __init__(self, name: str, delays: Delays) -> None:
         self.faults = SOUND
@@ -85,7 +96,7 @@ class Link:
         self._chance = Random(f"{name}/delay")
         self._luck: Random | None = None
         self._losing = False
-        self._last_arrival_s = 0.0
+        self._last_arrival_s = self._last_token_s = 0.0
 
     def carry(self, now_s: float) -> float:
         """When what is sent now arrives, behind what is on its way, whatever is wrong with the link."""
@@ -94,6 +105,15 @@ class Link:
             return self._last_arrival_s
         self._last_arrival_s = arrival_s
         return arrival_s
+
+    def carry_token(self, now_s: float) -> float:
+        """When a token arrives that goes or comes now: behind all that was said before, and the tokens before."""
+        self._last_token_s = max(self.carry(now_s), self._last_token_s)
+        return self._last_token_s
+
+    def heal(self) -> None:
+        """Begin afresh, as a new connection does: nothing waits behind what is still on its way."""
+        self._last_arrival_s, self._losing = 0.0, False
 
     def carry_badly(self, publication: Received, now_s: float) -> Iterator[tuple[float, Received]]:
         """When and as what a publication arrives that is sent now: not at all, once or twice."""
