@@ -74,6 +74,11 @@ class Allegiance:
         return self.election.office
 
     @property
+    def followed(self) -> Reign | None:
+        """Whose orders it obeys, or has obeyed last."""
+        return self.election.obedience.last
+
+    @property
     def obeyed_until_s(self) -> float:
         """When orders in force end unless more is heard of their leader."""
         return self.election.obedience.until_s
@@ -97,8 +102,10 @@ class Allegiance:
 
         Args:
             kind: of the message. Orders of one kind replace each other.
-            authority, warrant: of the order.
-            sender, incarnation: of its envelope.
+            authority: of the order.
+            sender: of its envelope.
+            incarnation: of the sender.
+            warrant: of the order.
             now_s: when it arrived.
         """
         reign = Reign(epoch=authority.epoch, leader=sender, incarnation=incarnation)

@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
+from agents.allegiance import Allegiance
 from agents.base_station import BaseStation
 from agents.behaviour import begin
 from agents.certificate_judge import certificate_judge
+from agents.collection import Collection
 from agents.driver import DiscDriver
-from agents.mission import Mission
+from agents.leadership import Leadership
+from agents.mind import Mind
+from agents.mission import Mission, RosterEntry
+from agents.planning_job import Answer, Question
 from agents.robot import Robot
 from agents.role import Role
+from agents.standing_orders import StandingOrders
 from agents.tracked_agent import TrackedAgent
 from planning.compiled_map import CompiledMap
 from planning.environment import Environment
 from planning.inflation import NothingLeft
-from protocol.messages import Point
+from protocol.messages import Point, Reign
 
 if TYPE_CHECKING:
     from agents.leader import DeploymentPlanner
@@ -39,29 +46,53 @@ class Casting:
         self._mission = mission
         self._environment = environment
         self._known_planner = planner
+        self._known_team_planner: TeamPlanner | None = None
         self._spaces: list[CompiledMap] = []
         self._judge = certificate_judge(mission, environment)
 
-    def cast(self, name: str) -> tuple[Role, DiscDriver]:
+    def cast(
+        self, name: str, *, incarnation: int = 0, promise: Reign | None = None, now_s: float = 0.0
+    ) -> tuple[Role, DiscDriver]:
         """Role and body of a peer.
+
+        Args:
+            name: of the peer.
+            incarnation: of its process.
+            promise: the last one on its disk.
+            now_s: the present time by its clock.
 
         Raises:
             KeyError: the name is not on the roster.
-            ValueError: the map leaves no room for a disc of its radius where it starts, or cannot be planned on.
+            ValueError: the map leaves no room for a disc of its radius where it starts; or the roster is none.
         """
         mission, entry = self._mission, self._mission.entry(name)
-        match entry.role:
-            case "base_station":
-                return BaseStation(mission, self._environment, self.team_planner()), DiscDriver(entry.start, 0.0)
-            case "tracked_agent":
-                radius_m, speed_m_s = mission.agent_radius_m, mission.agent_speed_m_s
-                space = self._space(radius_m, entry.start)
-                role: Role = TrackedAgent(mission, space.free, space.geodesics, begin(mission, space.free))
-            case "robot":
-                radius_m, speed_m_s = mission.robot_radius_m, mission.robot_speed_m_s
-                role = Robot(mission, name, self._judge)
+        if entry.role == "tracked_agent":
+            radius_m, speed_m_s = mission.agent_radius_m, mission.agent_speed_m_s
+            space = self._space(radius_m, entry.start)
+            role: Role = TrackedAgent(mission, space.free, space.geodesics, begin(mission, space.free))
+        else:
+            allegiance = Allegiance(
+                mission.voters, team=mission.team, name=name, incarnation=incarnation, promise=promise,
+                seed=mission.seed, heartbeat_s=1.0 / mission.heartbeat_hz, now_s=now_s,
+            )  # fmt: skip
+            role = self._compose(entry, allegiance, now_s)
+            radius_m, speed_m_s = mission.robot_radius_m, mission.robot_speed_m_s
+        if entry.role == "base_station":
+            return role, DiscDriver(entry.start, 0.0)
         room = self._space(max(radius_m - CLEARANCE_M, 0.0), entry.start).free
         return role, DiscDriver(entry.start, speed_m_s, room)
+
+    def _compose(self, entry: RosterEntry, allegiance: Allegiance, now_s: float) -> Mind:
+        """The mind of a peer with a vote: whom it follows, what it knows, its body, and leading. In this order."""
+        mission = self._mission
+        orders, collection = StandingOrders(allegiance), Collection(allegiance, mission.tracked_agent.name)
+        body: Robot | BaseStation
+        if entry.role == "robot":
+            robot = body = Robot(mission, entry.name, self._judge, allegiance, orders, now_s)
+        else:
+            robot, body = None, BaseStation(mission, self._environment, orders, collection, now_s)
+        leadership = Leadership(mission, allegiance, orders, collection, _Planner(self.team_planner), robot, now_s)
+        return Mind([allegiance, orders, collection, body, leadership])
 
     def planner(self) -> DeploymentPlanner:
         """The planner of the team's leader; built when it is first asked for.
@@ -75,6 +106,11 @@ class Casting:
 
     def team_planner(self) -> TeamPlanner:
         """What the leader plans with. Raises as :meth:`planner`."""
+        if self._known_team_planner is None:
+            self._known_team_planner = self._build_team_planner()
+        return self._known_team_planner
+
+    def _build_team_planner(self) -> TeamPlanner:
         from agents.motion_planner import MotionPlanner
         from agents.roaming import Roaming
         from agents.team_planner import TeamPlanner
@@ -83,7 +119,8 @@ class Casting:
         motions = MotionPlanner(mission, self._environment, deployments.graph, self._judge)
         speed_m_s, agent = mission.agent_speed_m_s, mission.tracked_agent
         space = self._space(mission.agent_radius_m, agent.start)
-        roaming = None if mission.announces else Roaming(space.geodesics, speed_m_s)
+        home = mission.base_station.start
+        roaming = None if mission.announces else Roaming(self._environment, space.geodesics, speed_m_s, home)
         return TeamPlanner(self._environment, deployments, motions, speed_m_s, roaming)
 
     def _build_planner(self) -> DeploymentPlanner:
@@ -121,3 +158,16 @@ class Casting:
         space = CompiledMap(self._environment, radius_m=radius_m, containing=start)
         self._spaces.append(space)
         return space
+
+
+class _Planner:
+    """The team's planner, built when it is first wanted: beside the control loop of whoever wants it."""
+
+    def __init__(self, build: Callable[[], TeamPlanner]) -> None:
+        self._build = build
+
+    def prepare(self) -> None:
+        self._build()
+
+    def plan(self, question: Question) -> Answer:
+        return self._build().plan(question)

@@ -10,17 +10,16 @@ A robot that is lost may still go as far as was released; then it stands. Its wa
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.motion_message import end_stage
 from agents.movement_authority import MovementAuthority, Onset
 from agents.records import Advance
 from planning.foresight import distance
-from protocol.messages import Authority, Motion, Point, Progress, State
+from protocol.messages import Authority, Motion, Point, State
 
 if TYPE_CHECKING:
     from agents.motion_planner import Course
@@ -37,7 +36,8 @@ NEAR: Final = 1.1
 """Ways of lost robots keep so many times from others what discs that touch do."""
 
 PATIENCE_S: Final = 2.0
-"""A robot that is heard, and has not accepted a revision for so long, does not know the plan."""
+"""A robot that is heard, and has not accepted a revision for so long, does not know the plan. One that has not answered
+an order to hold for so long does not hear the leader."""
 
 
 class Dispatcher:
@@ -46,13 +46,18 @@ class Dispatcher:
     Args:
         base: name of the base station.
         position: where it stands, metres, map frame.
-        starts: where each robot of the roster is while nothing is heard of it.
+        whereabouts: where each robot of the roster may be while nothing is heard of it.
         epoch: of the leader's authority.
         robot_radius_m: of all robots.
     """
 
     def __init__(
-        self, base: str, position: Point, starts: Mapping[str, Point], epoch: int, robot_radius_m: float
+        self,
+        base: str,
+        position: Point,
+        whereabouts: Mapping[str, Sequence[Point]],
+        epoch: int,
+        robot_radius_m: float,
     ) -> None:
         self._base, self._position, self._epoch = base, position, epoch
         self._radius_m = robot_radius_m
@@ -66,10 +71,11 @@ class Dispatcher:
         """Whether a motion of that plan has been asked for."""
         self._held: Authority | None = None
         """The first order to hold since the last plan ended."""
+        self._held_s = 0.0
         self._ordered: Authority | None = None
         """The first order of the present revision."""
         self._ordered_s = 0.0
-        self._lost: dict[str, Floats] = {name: np.array([place]) for name, place in starts.items()}
+        self._lost: dict[str, Floats] = {name: np.array(places).reshape(-1, 2) for name, places in whereabouts.items()}
         self._states: dict[str, State] = {}
         self.reports: list[str] = []
         """Why plans have ended; whoever reads it empties it."""
@@ -91,15 +97,6 @@ class Dispatcher:
         return bool(self._authority.undecided)
 
     @property
-    def progress(self) -> Progress | None:
-        """The base station's own, which stands."""
-        known = self._authority
-        if known is None:
-            return None
-        motion = known.motion
-        return Progress(epoch=known.epoch, plan=motion.plan, revision=motion.revision, finished=end_stage(motion))
-
-    @property
     def advance(self) -> Advance | None:
         """How far the motion under way is; None if everybody holds."""
         return None if self._authority is None else self._authority.advance()
@@ -118,7 +115,8 @@ class Dispatcher:
         """Note under which authority what is to be ordered has been; whether it was the first order of a revision."""
         self.news = False
         if self._authority is None:
-            self._held = self._held or authority
+            if self._held is None:
+                self._held, self._held_s = authority, now_s
         elif self._ordered is None:
             self._ordered, self._ordered_s = authority, now_s
             return True
@@ -143,6 +141,13 @@ class Dispatcher:
             way += [place for place in authority.way(robot) if place != state.position]
         self._lost[robot] = np.array(way)
         self._begin_afresh("")
+
+    def deaf(self, now_s: float) -> tuple[str, ...]:
+        """Robots that speak, and have not said for :data:`PATIENCE_S` that they have heard the order to hold."""
+        held = self._held
+        if self._authority is not None or held is None or now_s - self._held_s <= PATIENCE_S:
+            return ()
+        return tuple(robot for robot, state in self._states.items() if not has_heard(state, held))
 
     def release(self) -> None:
         """Let the robots go on as far as is due."""
@@ -190,7 +195,7 @@ class Dispatcher:
             self._begin_afresh(f"{robot} does not follow plan {self._plan} any more")
         elif self._ordered is None or robot not in authority.undecided:
             return
-        elif state.refusing and _has_heard(state, self._ordered):
+        elif state.refusing and has_heard(state, self._ordered):
             revision = authority.motion.revision
             self._begin_afresh(f"{robot} refuses revision {revision} of plan {self._plan}: {state.refusing}")
         elif now_s - self._ordered_s > PATIENCE_S:
@@ -225,13 +230,14 @@ def _moves(motion: Motion) -> bool:
 
 def _stands(state: State, since: Authority) -> bool:
     """Whether a robot says that it stands and follows no motion, having heard a command."""
-    return state.progress is None and _has_heard(state, since) and math.hypot(*state.velocity) < STILL_M_S
+    return state.progress is None and has_heard(state, since) and math.hypot(*state.velocity) < STILL_M_S
 
 
 def _plan(state: State) -> tuple[int, int] | None:
     return None if state.progress is None else (state.progress.epoch, state.progress.plan)
 
 
-def _has_heard(state: State, authority: Authority) -> bool:
+def has_heard(state: State, authority: Authority) -> bool:
+    """Whether a robot says that it has heard a command, or a later one."""
     heard = state.obeying
     return heard is not None and (heard.epoch, heard.sequence) >= (authority.epoch, authority.sequence)

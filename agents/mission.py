@@ -81,8 +81,6 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     heartbeat_hz: float
     planning_period_s: float
     """The leader looks at least this often whether the deployment still serves."""
-    valid_for_s: float
-    """How long robots obey a deployment that is not repeated."""
     decomposition: Literal["inflection", "aspect"]
     duration_s: float | None
     """Mission time at which the launcher ends the run; None: until it is told."""

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 from msgspec import structs
 
-from agents.mission import Mission
-from protocol.messages import Authority, Deployment
+from protocol.messages import Authority, Deployment, Warrant
 
 if TYPE_CHECKING:
     from agents.leader import Plan
@@ -16,17 +15,35 @@ if TYPE_CHECKING:
 Links = set[frozenset[object]]
 
 
-def first_orders(mission: Mission) -> Deployment:
+def first_orders(leader: str) -> Deployment:
     """What is said before there is a plan: to hold."""
     return Deployment(
-        authority=Authority(epoch=0, leader=mission.base_station.name, sequence=0),
-        valid_for_s=mission.valid_for_s, decision=0, placements=(), edges=(), cost=0.0, relays_needed=0,
+        authority=Authority(epoch=0, leader=leader, sequence=0), warrant=Warrant(lease_s=0.0, marks=()),
+        decision=0, placements=(), edges=(), cost=0.0, relays_needed=0,
         reason="everybody holds before the first plan",
     )  # fmt: skip
 
 
+def plan_of(orders: Deployment, agent: str) -> Plan | None:
+    """The plan that orders come from, as far as they tell, for a leader that did not make it; None before the first."""
+    from agents.leader import Plan  # its imports take a quarter of a second
+
+    if orders.decision == 0:
+        return None
+    return Plan(
+        placements=orders.placements,
+        edges=orders.edges,
+        cost=orders.cost,
+        relays_needed=orders.relays_needed,
+        serves=any(agent in edge for edge in orders.edges),
+        reason=orders.reason,
+        total_cost_m=orders.total_cost_m,
+        lower_bound_m=orders.lower_bound_m,
+    )
+
+
 def renew(orders: Deployment, plan: Plan, *, decides: bool) -> Deployment:
-    """The orders with the places of a plan, as a new decision or as the old one; authority and motion are not set."""
+    """The orders with the places of a plan, as a new decision or as the old one; the rest is set when it is said."""
     return structs.replace(
         orders,
         decision=orders.decision + decides,

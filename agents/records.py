@@ -48,6 +48,8 @@ def in_words(deployment: Deployment) -> str:
 class Ordered(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag="ordered"):
     """The leader has ordered a motion for the first time: a new plan, or a revision of it."""
 
+    epoch: int
+    """Of the leader. Numbers of plans begin anew with every epoch."""
     motion: Motion
 
 

@@ -5,7 +5,7 @@ waiting    has heard no order yet
 moving     on its way, in a stage that it may be in
 yielding   stands on its way until others are farther, or more is released
 arrived    stands where its way ends
-holding    was told to, or its orders have run out, or it cannot follow them
+holding    was told to, or obeys nobody any more, or cannot follow its orders
 =========  ====================================================================
 
 Standing is safe wherever it is, so whatever is amiss makes it stand, or end what it has accepted before.
@@ -14,22 +14,22 @@ Standing is safe wherever it is, so whatever is amiss makes it stand, or end wha
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable
 from typing import Final, Literal
 
 from msgspec import structs
 
+from agents.allegiance import AT_ONCE_S, Allegiance
 from agents.certificate_judge import Judge
 from agents.driver import patience_s
 from agents.mission import Mission
 from agents.path_follower import STANDING, Leg
 from agents.records import LogLine
-from agents.rhythm import EARLY_S
-from agents.role import Compute, Drive, Effect, Event, Heard, JobDone, Record, WakeAt, Woken, Written
+from agents.role import Compute, Drive, Effect, Event, Heard, JobDone, Record, Woken
 from agents.self_report import SelfReport
 from agents.stage_follower import ASTRAY_M, StageFollower
-from protocol.bus import PeerAppeared, PeerVanished
-from protocol.messages import Deployment, Mode, Motion, Point, State
+from agents.standing_orders import StandingOrders
+from protocol.messages import Deployment, Mode, Motion, Point, Reign, State
 
 CERTIFICATE: Final = "certificate"
 """Name of the job that judges a motion."""
@@ -39,32 +39,40 @@ LONG_S: Final = 2.0
 
 
 class Robot:
-    """Obeys the base station's deployments, the latest by (epoch, sequence), for as long as each is valid.
+    """Obeys the deployments of whoever leads, for as long as it is led: a part of the robot's mind.
 
-    The base station leads in this version: a deployment is an order if the base station says it in its own name. Its
-    motion is accepted when the robot has judged it; until then, and if it is refused, the robot goes on with the
-    motion that it has accepted before.
+    A motion is accepted when the robot has judged it; until then, and if it is refused, the robot goes on with the
+    motion that it has accepted before. When nobody is obeyed it stands at once and keeps what it has accepted: the same
+    leader may go on with it. A motion of another leader begins afresh.
 
     Args:
-        mission: rates, speeds, and who the base station is.
+        mission: rates and speeds.
         name: of this robot.
         judge: says what is wrong with a motion (:func:`agents.certificate_judge.certificate_judge`).
+        allegiance: says until when orders are in force.
+        orders: those of the leader, this robot or another.
+        now_s: the present time.
     """
 
-    hears = frozenset({"deployment", "state"})
+    hears = frozenset({"state"})
 
-    def __init__(self, mission: Mission, name: str, judge: Judge) -> None:
-        self._mission = mission
+    def __init__(
+        self, mission: Mission, name: str, judge: Judge, allegiance: Allegiance, orders: StandingOrders, now_s: float
+    ) -> None:
+        self.state: State | None = None
+        """What it has said of itself last, or would say."""
         self._name = name
-        self._leader = mission.base_station.name
         self._judge = judge
+        self._allegiance, self._standing = allegiance, orders
         self._follower = StageFollower(name, mission.robot_speed_m_s)
         self._patience_s = patience_s(mission.control_hz)
+        self._report = SelfReport(mission, "robot", mission.robot_radius_m, now_s)
+        self._wake_s = now_s
         self._mode: Mode = "waiting"
         self._orders: Deployment | None = None
-        self._orders_end_s = 0.0
-        self._orphaned = False
-        """Whether the orders have run out."""
+        """Taken last, in force or not."""
+        self._followed: Reign | None = None
+        """Who was obeyed last when that was looked at."""
         self._judging: tuple[int, Motion] | None = None
         """Epoch and motion that the job is about."""
         self._judged: tuple[int, Motion, str] | None = None
@@ -78,50 +86,42 @@ class Robot:
         self._leg: Leg = STANDING
         self._effects: list[Effect] = []
 
-    def start(self, now_s: float, position: Point) -> Sequence[Effect]:
-        """Begin the two rhythms: control with state, and heartbeat."""
-        self._report = SelfReport(self._mission, "robot", self._mission.robot_radius_m, now_s)
-        return self._live(now_s, position)
+    @property
+    def next_s(self) -> float:
+        """When something is due; at once if there are new orders or there is another leader."""
+        news = self._standing.latest is not self._orders or self._allegiance.followed != self._followed
+        return AT_ONCE_S if news else self._wake_s
 
-    def handle(self, event: Event, now_s: float) -> Sequence[Effect]:
-        """Take orders and news of the others when they arrive; decide and move when woken."""
+    def handle(self, event: Event, now_s: float) -> Iterable[Effect]:
+        """Hear of the others' progress; decide and move when woken."""
         match event:
             case Woken(position):
                 return self._live(now_s, position)
-            case Heard(_, envelope) if isinstance(envelope.body, Deployment):
-                return self._take_orders(envelope.sender, envelope.body, now_s)
             case Heard(_, envelope) if isinstance(envelope.body, State):
                 progress = envelope.body.progress
-                news = progress is not None and self._follower.hear(envelope.sender, progress)
-                return (WakeAt(now_s),) if news and self._mode == "yielding" else ()
+                if progress is not None and self._follower.hear(envelope.sender, progress) and self._mode == "yielding":
+                    self._wake_s = now_s
             case JobDone(job=name) if name == CERTIFICATE:
-                return self._take_verdict(event, now_s)
-            case Heard() | JobDone() | Written() | PeerAppeared() | PeerVanished():
-                return ()
+                self._take_verdict(event)
+                self._wake_s = now_s
+            case _:
+                pass
+        return ()
 
-    def _take_orders(self, sender: str, orders: Deployment, now_s: float) -> Sequence[Effect]:
-        authority = orders.authority
-        if sender != self._leader or authority.leader != self._leader:
-            return ()
-        if self._orders is not None:
-            known = self._orders.authority
-            if (authority.epoch, authority.sequence) <= (known.epoch, known.sequence):
-                return ()
-        self._orders, self._orders_end_s = orders, now_s + orders.valid_for_s
-        return (WakeAt(now_s),)
-
-    def _take_verdict(self, done: JobDone, now_s: float) -> Sequence[Effect]:
+    def _take_verdict(self, done: JobDone) -> None:
         if self._judging is not None:
             wrong = f"it could not be certified: {done.failure}" if done.failure else str(done.result)
             self._judged, self._judging = (*self._judging, wrong), None
-        return (WakeAt(now_s),)
 
-    def _live(self, now_s: float, position: Point) -> Sequence[Effect]:
+    def _live(self, now_s: float, position: Point) -> list[Effect]:
+        self._orders, self._followed = self._standing.latest, self._allegiance.followed
         obeys = self._obey(now_s, position)
         self._leg = self._follower.steer(position) if obeys else STANDING
         self._settle_mode(obeys, now_s)
-        self._effects.append(Drive(self._leg.velocity, min(self._leg.lasts_s, self._patience_s)))
-        state = State(
+        # However long this mind may hang after it has said so: the body stands when nobody is obeyed any more.
+        obeyed_s = max(0.0, self._allegiance.obeyed_until_s - now_s)
+        self._effects.append(Drive(self._leg.velocity, min(self._leg.lasts_s, self._patience_s, obeyed_s)))
+        self.state = State(
             position=position,
             velocity=self._leg.velocity,
             mode=self._mode,
@@ -131,26 +131,19 @@ class Robot:
             progress=self._follower.progress,
             refusing=self._refusing,
         )
-        news = (state.progress, state.refusing, state.mode == "holding")
-        self._effects += self._report.due(now_s, state, urgent=news != self._said)
+        epoch = None if self._orders is None else self._orders.authority.epoch
+        news = (self.state.progress, self.state.refusing, self.state.mode == "holding", epoch)
+        self._effects += self._report.due(now_s, self.state, urgent=news != self._said)
         self._said = news
-        self._effects.append(WakeAt(self._next_wake_s(now_s)))
+        self._wake_s = self._next_wake_s(now_s)
         effects, self._effects = self._effects, []
         return effects
 
     def _obey(self, now_s: float, position: Point) -> bool:
         """Make the orders one's own as far as they can be followed; whether there is something to follow."""
-        orders = self._orders
+        orders = self._standing.in_force(now_s)
         if orders is None:
             return False
-        if now_s >= self._orders_end_s - EARLY_S:
-            if not self._orphaned:
-                self._log("warning", f"no word from {self._leader} for {orders.valid_for_s:g} s: holding")
-            self._orphaned = True
-            return False
-        if self._orphaned:
-            self._log("info", f"hears {self._leader} again")
-        self._orphaned = False
         self._refusing = ""
         if orders.motion is None:
             self._halt(f"decision {orders.decision}: told to hold")
@@ -229,16 +222,12 @@ class Robot:
             self._yields_since_s = now_s
         elif now_s - self._yields_since_s > LONG_S:
             self._yields_since_s = math.inf
-            others = ", ".join(self._follower.waits_for()) or f"{self._leader} to release more"
+            others = ", ".join(self._follower.waits_for()) or "more to be released"
             self._log("info", f"has been waiting for {others} for {LONG_S:g} s")
 
     def _next_wake_s(self, now_s: float) -> float:
         wake_s = self._report.next_s
-        if self._leg.lasts_s > 0.0:
-            wake_s = min(wake_s, now_s + self._leg.lasts_s)
-        if self._mode in ("moving", "yielding", "arrived"):
-            wake_s = min(wake_s, self._orders_end_s)
-        return wake_s
+        return min(wake_s, now_s + self._leg.lasts_s) if self._leg.lasts_s > 0.0 else wake_s
 
     def _log(self, level: Literal["info", "warning"], text: str) -> None:
         self._effects.append(Record(LogLine(level=level, text=text)))

@@ -154,7 +154,9 @@ def live(
 
     environment = Environment.load(folder / mission.map_path)
     casting = Casting(mission, environment, planner)
-    role, driver = casting.cast(name)
+    voter_file = VoterFile(folder, name)
+    promise = voter_file.read(team=mission.team, incarnation=incarnation) if name in mission.voters.voters else None
+    role, driver = casting.cast(name, incarnation=incarnation, promise=promise, now_s=now())
     file = folder / "recordings" / f"{name}.{incarnation}.rrd"
     recorder = _open_recorder(file, mission, folder.name, name, environment, casting)
 
@@ -165,7 +167,6 @@ def live(
 
     inbox: Inbox[JobDone | Written] = Inbox()
     worker = Worker(inbox)
-    voter_file = VoterFile(folder, name)
     voter_file.serve(inbox.put)
     ending.wakes(inbox)
     endpoints = [entry.endpoint for entry in mission.roster]

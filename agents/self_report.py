@@ -9,6 +9,11 @@ from agents.role import Effect, Publish, Record
 from protocol.messages import Heartbeat, Intent, RoleName, State
 
 
+def silence_s(control_hz: float) -> float:
+    """Who has not recorded where it is for so long was not there."""
+    return max(1.0, 3.0 / control_hz)
+
+
 class SelfReport:
     """Two rhythms: where the body is, at ``control_hz``, and that the mind is alive, at ``heartbeat_hz``.
 

@@ -186,7 +186,6 @@ def _mission(scenario: Scenario, starts: tuple[Point, ...]) -> Mission:
         control_hz=scenario.rates.control_hz,
         heartbeat_hz=scenario.rates.heartbeat_hz,
         planning_period_s=scenario.planning.period_s,
-        valid_for_s=scenario.planning.valid_for_s,
         decomposition=scenario.planning.decomposition,
         placements=scenario.planning.placements,
         spacing_m=scenario.planning.spacing_m,

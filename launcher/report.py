@@ -13,8 +13,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.base_station import silence_s
 from agents.motion_level import AGENT, CHAIN, TEAM, certified_level
+from agents.self_report import silence_s
 from launcher.contacts import Overlap, find_overlaps
 from launcher.mission_trace import MissionTrace, Trail
 from launcher.wording import counted
@@ -155,7 +155,7 @@ def measure(trace: MissionTrace, environment: Environment) -> Metrics:
             for time_s, decision in trace.decisions
             if decision.topology_changed
         ),
-        plans=len({ordered.motion.plan for _, ordered in trace.motions}),
+        plans=len({(ordered.epoch, ordered.motion.plan) for _, ordered in trace.motions}),
         motions=len(trace.motions),
         certified=_certified(trace),
         agent_certain=_agent_certain(trace),

@@ -36,9 +36,6 @@ Duration = Annotated[float, Meta(gt=0, le=86400)]
 MOST_ROBOTS = 40
 """Every peer holds a connection to every other, which is good for about so many."""
 
-REPETITIONS = 4
-"""The base station says its orders so often while they are valid (:data:`agents.base_station.REPETITIONS`)."""
-
 
 class ScenarioFault(ValueError):
     """A scenario that cannot be run; the text says file, place and remedy in one sentence."""
@@ -98,7 +95,6 @@ class Planning(_Table, frozen=True, kw_only=True):
     search: Literal["chain", "exact", "one-edge", "fixed"] = "chain"
     """How the leader finds chains."""
     period_s: Annotated[float, Meta(ge=0.05, le=86400)] = 0.5
-    valid_for_s: Annotated[float, Meta(ge=0.2, le=86400)] = 3.0
 
 
 class Ranging(_Table, frozen=True, kw_only=True):
@@ -286,15 +282,9 @@ def _contradiction(scenario: Scenario) -> str:
             f"ranging.noise_m ({ranging.noise_m:g}) is more than ranging.bound_m ({ranging.bound_m:g}), and the "
             "estimate would lose the agent; make bound_m at least as large"
         )
-    planning, control_s = scenario.planning, 1 / scenario.rates.control_hz
+    planning = scenario.planning
     if planning.spacing_m is not None and planning.placements == "cells":
         return "planning.spacing_m is given and planning.placements is 'cells'; only points are on a grid, remove one"
-    for least_s, what in ((2 * planning.period_s, "two planning"), (REPETITIONS * control_s, "four control")):
-        if planning.valid_for_s < least_s:
-            return (
-                f"planning.valid_for_s ({planning.valid_for_s:g}) is less than {what} periods; "
-                f"make it at least {least_s:g}, or robots hold between two orders"
-            )
     return ""
 
 

@@ -203,10 +203,11 @@ class Deployment(Body, frozen=True, kw_only=True, tag="deployment"):
     """The leader's standing order: who goes where and how, and which links make the chain. Repeated while it holds."""
 
     authority: Authority
-    valid_for_s: Seconds
-    """How long a robot may obey this, from when it was heard, without hearing a later one."""
+    warrant: Warrant
+    """By this each hearer judges whether, and for how long, the leader may be obeyed."""
     decision: Count
-    """Number of the decision; repetitions of one decision have different authority sequences."""
+    """Number of the decision; repetitions of one decision have different authority sequences. The next leader goes on
+    with it."""
     placements: tuple[Placement, ...]
     edges: tuple[tuple[Name, Name], ...]
     """Links of the deployment tree between peers; from the base station, through relays, to the agent."""

@@ -110,7 +110,7 @@ EXAMPLES: Final[tuple[AnyBody, ...]] = (
     GoalReply(correlation="5f2c9a", accepted=True),
     Deployment(
         authority=Authority(epoch=1, leader="base", sequence=42),
-        valid_for_s=1.5,
+        warrant=Warrant(lease_s=0.71, marks=(LastHeard(peer="base", mark="0.9"), LastHeard(peer="robot1", mark="0.7"))),
         decision=7,
         placements=(
             Placement(robot="robot1", position=(7.0, 3.0), cell=118),

@@ -58,7 +58,6 @@ def make_mission() -> Mission:
         control_hz=10.0,
         heartbeat_hz=2.0,
         planning_period_s=0.5,
-        valid_for_s=3.0,
         decomposition="inflection",
         duration_s=30.0,
         seed=1,

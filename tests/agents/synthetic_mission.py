@@ -13,7 +13,7 @@ import numpy as np
 from agents.mission import Mission, OnDemand, RosterEntry
 from agents.records import AnyRecord, Connectivity, Decision, LogLine, Planned, Track
 from planning.environment import Environment
-from protocol.messages import Authority, Deployment, Placement, Point, RoleName
+from protocol.messages import Authority, Deployment, Placement, Point, RoleName, Warrant
 
 PERIOD_S = 0.1
 DURATION_S = 12.0
@@ -49,7 +49,6 @@ def mission() -> Mission:
         control_hz=1.0 / PERIOD_S,
         heartbeat_hz=2.0,
         planning_period_s=1.0,
-        valid_for_s=2.0,
         decomposition="inflection",
         duration_s=DURATION_S,
         seed=1,
@@ -128,7 +127,7 @@ def decisions() -> Iterator[tuple[float, AnyRecord]]:
                 Decision(
                     deployment=Deployment(
                         authority=Authority(epoch=0, leader="base", sequence=step),
-                        valid_for_s=2.0,
+                        warrant=Warrant(lease_s=0.8, marks=()),
                         decision=step // 40 + 1,
                         placements=(
                             Placement(robot="robot_1", position=places["robot_1"], cell=1, spare=relay != "robot_1"),

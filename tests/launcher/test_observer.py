@@ -21,6 +21,7 @@ from protocol.messages import (
     Placement,
     Point,
     State,
+    Warrant,
     encode,
     kind_of,
 )
@@ -45,7 +46,7 @@ def intent(position: Point, goal: Point | None = None) -> Intent:
 def deployment(sequence: int, epoch: int = 1) -> Deployment:
     return Deployment(
         authority=Authority(epoch=epoch, leader="base", sequence=sequence),
-        valid_for_s=3.0,
+        warrant=Warrant(lease_s=0.8, marks=()),
         decision=sequence,
         placements=(
             Placement(robot="robot1", position=(4.5, 3.5), cell=0),

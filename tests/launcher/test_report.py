@@ -16,7 +16,7 @@ from launcher.mission_trace import MissionTrace
 from launcher.report import CertifiedShares, Metrics, measure
 from launcher.report_table import render
 from planning.environment import Environment
-from protocol.messages import Authority, Deployment, MemberWay, Motion, Placement, Point
+from protocol.messages import Authority, Deployment, MemberWay, Motion, Placement, Point, Warrant
 from tests.agents.conftest import make_mission
 
 CORNER = Environment([(0, 0), (10, 0), (10, 5), (5, 5), (5, 10), (0, 10)])
@@ -36,7 +36,7 @@ def tracks(
 def decide(time_s: float, number: int, relays: tuple[str, ...], changed: bool = False) -> tuple[float, str, AnyRecord]:
     deployment = Deployment(
         authority=Authority(epoch=0, leader="base", sequence=number),
-        valid_for_s=3.0,
+        warrant=Warrant(lease_s=0.8, marks=()),
         decision=number,
         placements=tuple(Placement(robot=robot, position=(1.0, 1.0), spare=robot not in relays)
                          for robot in ("robot1", "robot2")),
@@ -175,7 +175,7 @@ def test_certificates_count_for_as_long_as_their_motions() -> None:
             plan=number // 2, revision=number % 2, first_stage=0, released=-1, ways=ways,
             connection=connection, joined=("base", "robot1"),  # type: ignore[arg-type]
         )  # fmt: skip
-        return time_s, "base", Ordered(motion=motion)
+        return time_s, "base", Ordered(epoch=1, motion=motion)
 
     records = [entry for peer in ("base", "agent", "robot1", "robot2") for entry in tracks(peer, (1.0, 1.0))]
     records += [

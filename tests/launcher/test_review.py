@@ -144,7 +144,7 @@ def test_motions_are_certified_once_more_from_the_recording(run_folder: Path, tm
     )  # fmt: skip
     motion = Motion(plan=0, revision=0, first_stage=0, released=0, ways=ways, connection="none")
     recorder = RerunRecorder(tmp_path / "recordings" / "base.0.rrd", team="demo", recording_id="run", peer="base")
-    recorder.record(1.5, "base", Ordered(motion=motion))
+    recorder.record(1.5, "base", Ordered(epoch=1, motion=motion))
     recorder.close()
     failures = conclude(RunFolder(tmp_path)).failures
     assert len(failures) == collides

@@ -105,25 +105,10 @@ FAULTS = {
     "script without goals": (GOOD.replace("goals =", "#"), "'script' and there are no goals", "add goals = "),
     "goals without script": (GOOD.replace('"script"', '"wander"'), "behaviour is 'wander'", 'behaviour = "script"'),
     "name no name": ('name = "A team"\n' + GOOD, "name 'A team' cannot name a team", "use at most 32"),
-    "orders that run out": (
-        GOOD + "\n[planning]\nperiod_s = 2.0\nvalid_for_s = 1.0\n",
-        "planning.valid_for_s",
-        "make it at least 4",
-    ),
     "planning without a pause": (
         GOOD + "\n[planning]\nperiod_s = 0.001\n",
         "planning.period_s is out of range",
         "at least 0.05",
-    ),
-    "orders of no length": (
-        GOOD + "\n[planning]\nperiod_s = 0.05\nvalid_for_s = 0.1\n",
-        "planning.valid_for_s is out of range",
-        "at least 0.2",
-    ),
-    "orders that run out between two looks": (
-        GOOD + "\n[planning]\nvalid_for_s = 3\n[rates]\ncontrol_hz = 1\n",
-        "planning.valid_for_s (3) is less than four control periods",
-        "make it at least 4",
     ),
     "count and starts differ": (
         GOOD + "starts = [[2, 2]]\n",
@@ -269,12 +254,10 @@ def test_robots_and_agent_may_stand_on_the_base(write: Write) -> None:
 def test_bounds_are_those_of_what_they_are_for() -> None:
     import msgspec
 
-    from agents import base_station
-    from launcher import console, scenario
+    from launcher import console
     from planning import polygon_validation
     from protocol.messages import Coordinate
 
-    assert scenario.REPETITIONS == base_station.REPETITIONS
     assert console.FARTHEST_M <= polygon_validation.FARTHEST_M
     for far in (console.FARTHEST_M, -console.FARTHEST_M):
         assert msgspec.convert(far, Coordinate) == far

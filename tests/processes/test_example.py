@@ -25,6 +25,7 @@ from protocol.messages import (
     Heartbeat,
     Intent,
     Placement,
+    Warrant,
     decode,
     encode,
     kind_of,
@@ -91,7 +92,7 @@ def team() -> Iterator[tuple[list[str], Actor]]:
     endpoints = free_endpoints(3)
     deployment = Deployment(
         authority=Authority(epoch=1, leader="base", sequence=1),
-        valid_for_s=2.0,
+        warrant=Warrant(lease_s=0.8, marks=()),
         decision=3,
         placements=(Placement(robot="robot1", position=(4.0, 2.0), cell=1),),
         edges=(("base", "robot1"), ("robot1", "agent")),

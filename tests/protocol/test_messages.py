@@ -90,7 +90,7 @@ bodies = st.one_of(
     st.builds(
         Deployment,
         authority=authorities,
-        valid_for_s=seconds,
+        warrant=warrants,
         decision=counts,
         placements=st.lists(
             st.builds(Placement, robot=names, position=points, cell=st.none() | counts, spare=st.booleans()), max_size=4
@@ -231,7 +231,7 @@ def motion_of(waypoints: int = 1, marks: int = 2, ways: int = 1, joined: int = 0
         joined=("robot1",) * joined,
     )  # fmt: skip
     body = Deployment(
-        authority=Authority(epoch=0, leader="base", sequence=1), valid_for_s=1.0, decision=1, placements=(), edges=(),
+        authority=Authority(epoch=0, leader="base", sequence=1), warrant=Warrant(lease_s=1.0, marks=()), decision=1, placements=(), edges=(),
         cost=0.0, relays_needed=0, reason="", motion=motion,
     )  # fmt: skip
     return encode(Envelope(sender="base", incarnation=0, sequence=1, sent_at_s=0.0, body=body))

@@ -1,0 +1,253 @@
+"""What a leader does in one reign: hold first, plan from a standstill, order, go on as the team progresses.
+
+A *decision* is a choice of links and relay places. While one stands it is repeated, with a rising authority sequence,
+the spares' places brought up to date, and as much of the motion released as is due (:mod:`agents.dispatcher`); the
+decision's number rises only when links or relay places change, and goes on from that of the leader before.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final, Literal, Protocol
+
+from msgspec import structs
+
+from agents.allegiance import Allegiance
+from agents.collection import Collection
+from agents.dispatcher import Dispatcher, has_heard
+from agents.mission import Mission
+from agents.orders import changes_topology, first_orders, is_decision, plan_of, renew
+from agents.planning_job import Answer, Question
+from agents.records import Advance, Decision, LogLine, Ordered, Planned
+from agents.rhythm import EARLY_S, Rhythm
+from agents.role import Effect, JobDone, Publish, Record
+from agents.standing_orders import StandingOrders
+from protocol.membership import Presence
+from protocol.messages import Authority, Reign, State
+
+if TYPE_CHECKING:
+    from agents.leader import Plan
+
+GRACE_S: Final = 1.5
+"""The first deployment waits so long for robots that have not been heard yet, counted from when this peer started."""
+
+REPEAT_S: Final = 0.4
+"""A deployment is repeated after this, so that who comes late or has lost some hears it within a second."""
+
+AGAIN_S: Final = 0.2
+"""A deployment is said again after this while robots have not answered it."""
+
+PACE_S: Final = 0.04
+"""Deployments are at least so far apart, however much there is to release."""
+
+
+class Body(Protocol):
+    """What the leader needs of its own body."""
+
+    @property
+    def state(self) -> State | None:
+        """What this robot says of itself."""
+
+
+class ReignDuty:
+    """See the module.
+
+    Args:
+        mission: roster, rates and periods.
+        reign: the office.
+        allegiance: gives warrants.
+        orders: takes the peer's own orders; what was taken last says where the team stands.
+        collection: what is known of the others.
+        body: the leader's own, if it is a robot.
+        now_s: the present time.
+        complete_by_s: until then robots are waited for of which nothing has been heard.
+    """
+
+    def __init__(
+        self,
+        mission: Mission,
+        reign: Reign,
+        allegiance: Allegiance,
+        orders: StandingOrders,
+        collection: Collection,
+        body: Body | None,
+        *,
+        now_s: float,
+        complete_by_s: float,
+    ) -> None:
+        self.reign = reign
+        self._mission, self._allegiance, self._standing, self._body = mission, allegiance, orders, body
+        self._collection = collection
+        self._complete_by_s = complete_by_s
+        self._agent = mission.tracked_agent.name
+        self._robots = tuple(robot.name for robot in mission.robots)
+        places = {robot.name: collection.whereabouts(robot.name) or (robot.start,) for robot in mission.robots}
+        base = mission.base_station
+        self._dispatcher = Dispatcher(base.name, base.start, places, reign.epoch, mission.robot_radius_m)
+        self._authority = Authority(epoch=reign.epoch, leader=reign.leader, sequence=0)
+        told = first_orders(reign.leader) if orders.latest is None else orders.latest
+        self._orders = structs.replace(told, authority=self._authority, motion=None)
+        """What was said last."""
+        self._plan: Plan | None = plan_of(told, self._agent)
+        self._heard: dict[str, State] = {}
+        self._deaf: dict[str, Authority] = {}
+        """Robots that do not hear the leader, and when they were given up."""
+        self._goal: object = None
+        """Where the agent was going when that was looked at last."""
+        self._replanning = Rhythm(mission.planning_period_s, now_s)
+        self._say_at_s, self._said_s = now_s, -math.inf
+        self._advance: Advance | None = None
+        """What was recorded last."""
+        self._planning, self._urgent = False, True
+        self._complaints: dict[str, str] = {}
+        """What was wrong last, by what it was about; said once, however often it happens."""
+        self._effects: list[Effect] = []
+
+    @property
+    def next_s(self) -> float:
+        """When there is something to do."""
+        return min(self._replanning.next_s, self._say_at_s)
+
+    def lead(self, now_s: float) -> None:
+        """Learn what is new, and say what is due."""
+        self._follow(now_s)
+        self._heed(now_s)
+        if now_s >= self._say_at_s - EARLY_S:
+            self._say(now_s)
+
+    def collect(self) -> list[Effect]:
+        """Effects since the last time."""
+        effects, self._effects = self._effects, []
+        return effects
+
+    def _follow(self, now_s: float) -> None:
+        """Tell the dispatcher who is where, who is new and who is lost, and note where the agent goes."""
+        for robot in self._robots:
+            state, before = self._state(robot), self._heard.get(robot)
+            if robot in self._deaf and (state is None or has_heard(state, self._deaf[robot])):
+                del self._deaf[robot]
+            if state is None or robot in self._deaf:
+                self._lose(robot)
+            elif state is not before:
+                self._urgent = self._urgent or before is None
+                self._heard[robot] = state
+                self._dispatcher.hear(robot, state, now_s)
+        for robot in self._dispatcher.deaf(now_s):
+            self._deaf[robot] = self._authority
+            self._log("warning", f"{robot} does not answer: the team goes on without it")
+            self._lose(robot)
+        intent = self._collection.intent()
+        goal = None if intent is None else (intent.goal,)
+        if goal != self._goal:
+            self._goal = goal
+            self._urgent = True
+
+    def _state(self, robot: str) -> State | None:
+        own = robot == self._allegiance.name
+        return self._collection.state(robot) if not own or self._body is None else self._body.state
+
+    def _lose(self, robot: str) -> None:
+        if self._heard.pop(robot, None) is not None:
+            self._dispatcher.lose(robot)
+            self._urgent = True
+
+    def _heed(self, now_s: float) -> None:
+        """See to what the dispatcher has come to, after it was told something."""
+        for text in self._dispatcher.reports:
+            self._log("warning", text)
+        self._dispatcher.reports.clear()
+        if not self._planning:  # what is planned begins where the robots may go now
+            self._dispatcher.release()
+        if self._dispatcher.news:
+            self._say_at_s = min(self._say_at_s, max(now_s, self._said_s + PACE_S))
+
+    def ask(self, now_s: float, *, busy: bool) -> Question | None:
+        """What to plan now, as soon as the agent and enough of the team are known.
+
+        Args:
+            now_s: the present time.
+            busy: whether a question is being worked on, of this reign or one before.
+        """
+        due = self._replanning.due(now_s) or self._urgent
+        intent = self._collection.intent()
+        if not due or busy or intent is None or not self._is_complete(now_s):
+            return None
+        onset = self._dispatcher.onset()
+        self._urgent = onset is None
+        if onset is None:
+            return None
+        self._planning = True
+        return Question(
+            way=intent.path or (intent.position,),
+            onset=onset,
+            lead_s=self._dispatcher.lead_s,
+            previous=self._plan,
+            heading=self._dispatcher.heading,
+            lost=self._dispatcher.lost,
+        )
+
+    def _is_complete(self, now_s: float) -> bool:
+        if now_s >= self._complete_by_s:
+            return True
+        missing = (robot for robot in self._robots if robot not in self._heard)
+        return all(self._allegiance.presence(robot) is Presence.GONE for robot in missing)
+
+    def take(self, done: JobDone, now_s: float) -> None:
+        """Take over what was planned: a new decision, other places for the spares, another motion, or nothing new."""
+        self._planning = False
+        self._complain("error", "planning failed, the last deployment stands: ", done.failure)
+        if not done.failure:
+            answer: Answer = done.result
+            self._effects.append(Record(Planned(planning_s=done.duration_s, in_sight_s=answer.in_sight_s)))
+            self._decide(answer.plan, done.duration_s)
+            self._complain("error", "no motion to the deployment: ", answer.failure)
+            if answer.course is not None and self._dispatcher.take(answer.course):
+                self._complain("warning", "the motion is less than wished: ", answer.course.reason)
+        self._heed(now_s)
+
+    def _decide(self, plan: Plan, planning_s: float) -> None:
+        """Take a deployment over, and say so soon unless it is the same as before."""
+        before = self._plan
+        self._plan = plan
+        if plan.serves != (before is None or before.serves):
+            self._log("info" if plan.serves else "warning", plan.reason)
+        decides = is_decision(plan, before)
+        if before is not None and not decides and plan.placements == before.placements:
+            return
+        self._orders = renew(self._orders, plan, decides=decides)
+        self._say_at_s = -math.inf
+        if decides:
+            changed = changes_topology(plan, before)
+            self._effects.append(
+                Record(Decision(deployment=self._orders, planning_s=planning_s, topology_changed=changed))
+            )
+
+    def _say(self, now_s: float) -> None:
+        """Order what stands, under the next authority, if that may be: the peer itself obeys like all others."""
+        self._say_at_s = now_s + PACE_S
+        warrant = self._allegiance.warrant(now_s)
+        if warrant is None:
+            return
+        dispatcher, motion = self._dispatcher, self._dispatcher.motion
+        authority = structs.replace(self._authority, sequence=self._authority.sequence + 1)
+        orders = structs.replace(self._orders, authority=authority, warrant=warrant, motion=motion)
+        if self._standing.give(orders, now_s):
+            return
+        self._authority, self._orders = authority, orders
+        if dispatcher.said(authority, now_s) and motion is not None:
+            self._effects.append(Record(Ordered(epoch=self.reign.epoch, motion=motion)))
+        if (advance := dispatcher.advance) != self._advance and advance is not None:
+            self._effects.append(Record(advance))
+        self._advance = advance
+        self._said_s = now_s
+        self._say_at_s = now_s + (AGAIN_S if dispatcher.pressing else REPEAT_S)
+        self._effects.append(Publish(orders))
+
+    def _complain(self, level: Literal["warning", "error"], what: str, why: str) -> None:
+        """Log what is wrong; the same only once, however often it happens."""
+        if why and why != self._complaints.get(what):
+            self._log(level, f"{what}{why}")
+        self._complaints[what] = why
+
+    def _log(self, level: Literal["info", "warning", "error"], text: str) -> None:
+        self._effects.append(Record(LogLine(level=level, text=text)))
