@@ -101,6 +101,33 @@ class Office(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag=
     """When it ceased to obey the one that it obeyed before, likewise."""
 
 
+class Estimate(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag="estimate"):
+    """Where the recording peer takes the agent to be; once a second, from the first range on."""
+
+    center: Point
+    area_m2: float
+    age_s: float
+    """Since the newest range in it."""
+    rings: tuple[tuple[Point, ...], ...]
+    """Outlines of the set, open: of its parts, and of holes in them."""
+    made: int
+    """Ranges that this process has measured."""
+    heard: int
+    """Ranges of all processes that it has, or does not wait for any more."""
+    held: int
+    """Of these, those kept one by one."""
+    folded: int
+    """Of these, those that it has put into the set in front of the others."""
+    late: int
+    """Ranges that came after their place was folded, and were dropped."""
+    refused: int
+    """Ranges, digests and bases of others that no peer can have said."""
+    compared_s: float
+    """Up to this mission time its log is summed up in ``fingerprint``."""
+    fingerprint: int | None
+    """Peers with equal ones for a time have equal sets; none where it cannot be told any more."""
+
+
 class LogLine(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag="log"):
     """A sentence for the reviewer."""
 
@@ -121,4 +148,4 @@ class Mishap(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag=
     """Whether it is over with this, or begins."""
 
 
-AnyRecord: TypeAlias = Track | Decision | Ordered | Advance | Planned | Connectivity | Office | LogLine | Mishap
+AnyRecord: TypeAlias = Track | Decision | Ordered | Advance | Planned | Connectivity | Estimate | Office | LogLine | Mishap
