@@ -10,7 +10,7 @@ from typing import Literal, TypeAlias
 
 import msgspec
 
-from protocol.messages import Deployment, Mode, Motion, Point, Reign, RoleName
+from protocol.messages import Deployment, Edge, Method, Mode, Motion, Point, Reign, RoleName
 
 
 class Track(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag="track"):
@@ -60,6 +60,30 @@ class Advance(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag
     """Those that may be begun."""
     finished: dict[str, int]
     """Those that each robot has finished."""
+
+
+class TopologyChange(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag="topology_change"):
+    """A proposal of the leader to change the team's tree is settled: its tree is in force, or it has been given up."""
+
+    number: tuple[int, int]
+    """Epoch of the leader, and of the tree in that epoch."""
+    committed: bool
+    """Whether it is in force."""
+    before: tuple[Edge, ...]
+    """Links of the tree that was in force when it was proposed."""
+    edges: tuple[Edge, ...]
+    """Links of the tree proposed."""
+    new: tuple[Edge, ...]
+    """Links of it that had to be confirmed."""
+    released: tuple[Edge, ...]
+    """Links of the tree before that it does without; they are kept if it has been given up."""
+    method: Method
+    rounds: int
+    """How often the proposal was said."""
+    duration_s: float
+    """From then on until it was settled."""
+    reason: str
+    """Why it was made, or why it has been given up."""
 
 
 class Planned(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag="planned"):
@@ -148,4 +172,16 @@ class Mishap(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag=
     """Whether it is over with this, or begins."""
 
 
-AnyRecord: TypeAlias = Track | Decision | Ordered | Advance | Planned | Connectivity | Estimate | Office | LogLine | Mishap
+AnyRecord: TypeAlias = (
+    Track
+    | Decision
+    | Ordered
+    | Advance
+    | Planned
+    | Connectivity
+    | Estimate
+    | Office
+    | LogLine
+    | Mishap
+    | TopologyChange
+)

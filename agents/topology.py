@@ -1,0 +1,369 @@
+"""The team's tree, as every peer with a vote keeps it: what is in force, what is proposed, and what it says of that.
+
+The negotiation itself is :mod:`protocol.negotiation` (the leader's side) and :mod:`protocol.held_tree` (everybody's).
+Here they are joined to a mind: words that are not in force are not heard, links are judged by what this peer knows
+itself (:mod:`agents.link_sight`) beside its control loop, and what comes of it is recorded.
+
+Whoever leads asks :meth:`TeamTree.is_in_force` before it lets robots go where another tree is needed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final, Literal, Protocol
+
+from agents.allegiance import AT_ONCE_S, Allegiance
+from agents.collection import Collection as Others
+from agents.link_sight import Scene, judge_links, places_on, stages_in_sight
+from agents.mission import Mission
+from agents.records import LogLine, TopologyChange
+from agents.role import Compute, Effect, Event, Heard, JobDone, Publish, Record
+from agents.standing_orders import StandingOrders
+from planning.environment import Environment
+from protocol import core
+from protocol.core import Note, Tick, WakeAt
+from protocol.held_tree import HeldTree
+from protocol.membership import Presence
+from protocol.messages import (
+    Authority,
+    Confirmation,
+    Deployment,
+    Edge,
+    LinkView,
+    Method,
+    Milestone,
+    Motion,
+    NewLink,
+    Point,
+    Reign,
+    State,
+    Topology,
+    TreeNumber,
+)
+from protocol.negotiation import Deposed, Elected, Negotiation, Propose, Settled, Withdraw, Word
+from protocol.negotiation import Event as NegotiationEvent
+from protocol.topology import in_words
+
+JUDGING: Final = "judging links"
+FORESEEING: Final = "foreseeing links"
+"""Names of the jobs: as an end of links, and as the leader that proposes them."""
+
+ANSWER_S: Final = 1.0
+"""The standing answer is said again after this."""
+
+
+class Body(Protocol):
+    """What is needed of a robot's own body."""
+
+    @property
+    def state(self) -> State | None:
+        """What it says of itself."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Wish:
+    """A tree that the leader is about to propose."""
+
+    members: tuple[str, ...]
+    edges: tuple[Edge, ...]
+    motion: Motion | None
+    method: Method
+    reason: str
+
+
+class TeamTree:
+    """See the module.
+
+    Args:
+        mission: roster.
+        environment: the map as drawn.
+        allegiance: whose word counts, and whether this peer leads.
+        orders: as this peer has taken them.
+        others: where they are.
+        body: this peer's own, if it is a robot; the base station stands, and accepts any motion.
+        may_be: where the agent may be, of one that does not announce its way.
+    """
+
+    hears = frozenset({"topology", "confirmation", "deployment"})
+    """The last since links are judged as soon as the motion is ordered that they are about."""
+
+    def __init__(
+        self,
+        mission: Mission,
+        environment: Environment,
+        allegiance: Allegiance,
+        orders: StandingOrders,
+        others: Others,
+        body: Body | None = None,
+        may_be: Callable[[float], Sequence[Point]] | None = None,
+    ) -> None:
+        self.held = HeldTree(allegiance.name)
+        self._name = allegiance.name
+        self._agent = mission.tracked_agent.name
+        self._starts = {entry.name: entry.start for entry in mission.roster}
+        self._voters = (mission.base_station.name, *(robot.name for robot in mission.robots))
+        self._environment, self._allegiance, self._orders, self._others = environment, allegiance, orders, others
+        self._body, self._may_be = body, may_be
+        self._negotiation = Negotiation(self._voters)
+        self._reign: Reign | None = None
+        """That the negotiation is of."""
+        self._said = 0
+        """Words in this reign."""
+        self._wish: _Wish | None = None
+        self._judging: TreeNumber | None = None
+        """The proposal whose links a job is about."""
+        self._epoch = -1
+        """Of the last word heard."""
+        self._answer: Confirmation | None = None
+        """What was said last."""
+        self._answer_at_s = -math.inf
+        self._tick_s = math.inf
+        self._news = False
+        """Whether a proposal has been settled since this peer was woken."""
+        self._complaint = ""
+        self._effects: list[Effect] = []
+
+    @property
+    def next_s(self) -> float:
+        """When something is to be said."""
+        return AT_ONCE_S if self._news else min(self._answer_at_s, self._tick_s)
+
+    @property
+    def links(self) -> tuple[Edge, ...]:
+        """Links of the tree that this peer keeps."""
+        return self.held.links
+
+    @property
+    def busy(self) -> bool:
+        """Whether a proposal of this leader is being made, or is open."""
+        return self._wish is not None or self._negotiation.proposal is not None
+
+    def is_in_force(self, edges: Collection[Edge]) -> bool:
+        """Whether this tree has been confirmed in this peer's own reign, and is in force."""
+        return self._negotiation.is_in_force(self._members(edges), edges)
+
+    def may_propose(self, now_s: float, *, urgent: bool) -> bool:
+        """Whether another tree can be proposed now; ``urgent``: the one in force does not serve any more."""
+        return not self.busy and self._negotiation.may_propose(now_s, urgent)
+
+    def serves(self, present: Collection[str], last_relay: Point, now_s: float) -> bool:
+        """Whether the tree in force still does: its members are there, and its last relay sees where the agent may be.
+
+        Args:
+            present: base station and robots that are there.
+            last_relay: where the last relay of the tree is going, or the base station is.
+            now_s: the time.
+        """
+        tree = self._negotiation.committed
+        if tree is None or self._agent not in tree.members:
+            return False
+        scene = Scene(self._environment, None, {self._name: last_relay}, self._agent, self._agent_places(now_s))
+        sees = stages_in_sight(scene, [(self._name, self._agent)]) == [0]
+        return sees and all(member in present for member in tree.members if member != self._agent)
+
+    def propose(
+        self, edges: Collection[Edge], motion: Motion | None, method: Method, reason: str, now_s: float
+    ) -> list[Effect]:
+        """Begin to negotiate another tree; only when :meth:`may_propose`.
+
+        Args:
+            edges: of the tree, which joins all that they name, or only the base station.
+            motion: that leads to where it can be; None: everybody stands.
+            method: how it was found.
+            reason: why it is to replace the one before.
+            now_s: the time.
+        """
+        self._wish = _Wish(self._members(edges), tuple(edges), motion, method, reason)
+        scene = self._scene(motion, now_s)
+        return [Compute(FORESEEING, stages_in_sight, (scene, self._wish.edges))]
+
+    def withdraw(self, reason: str, now_s: float) -> list[Effect]:
+        """Give up what is being proposed."""
+        self._wish = None
+        self._negotiate(Withdraw(reason), now_s)
+        return self._collect()
+
+    def look(self, now_s: float) -> list[Effect]:
+        """Have links judged that have been waiting for orders of this peer itself, which have been given now."""
+        self._judge(now_s)
+        return self._collect()
+
+    def handle(self, event: Event, now_s: float) -> Iterable[Effect]:
+        """Take up or leave the office, hear words and answers, judge links, and say what is due."""
+        self._news = False
+        self._follow_office(now_s)
+        match event:
+            case Heard(_, envelope) if isinstance(envelope.body, Topology):
+                self._hear_word(envelope.body, envelope.sender, envelope.incarnation, now_s)
+            case Heard(_, envelope) if isinstance(envelope.body, Confirmation):
+                if self._allegiance.leads(now_s):
+                    self._negotiate(core.Heard(envelope.sender, envelope.incarnation, envelope.body), now_s)
+            case JobDone(job=name) if name == JUDGING:
+                self._judged(event)
+            case JobDone(job=name) if name == FORESEEING:
+                self._foreseen(event, now_s)
+        if self._reign is not None and now_s >= self._tick_s:
+            self._negotiate(Tick(), now_s)
+        self._judge(now_s)
+        self._confirm(now_s)
+        return self._collect()
+
+    def _collect(self) -> list[Effect]:
+        effects, self._effects = self._effects, []
+        return effects
+
+    def _members(self, edges: Collection[Edge]) -> tuple[str, ...]:
+        return tuple(dict.fromkeys((self._voters[0], *(end for edge in edges for end in edge))))
+
+    def _follow_office(self, now_s: float) -> None:
+        """Begin to negotiate when this peer has been elected, and end when it leads no more."""
+        reign = self._allegiance.reign
+        if reign == self._reign:
+            return
+        self._reign, self._said, self._wish = reign, 0, None
+        if reign is None:
+            self._negotiate(Deposed(), now_s)
+        else:
+            present = frozenset(name for name in self._voters if self._allegiance.presence(name) is Presence.PRESENT)
+            self._negotiate(Elected(reign.epoch, present), now_s)
+
+    def _negotiate(self, event: NegotiationEvent, now_s: float) -> None:
+        for effect in self._negotiation.handle(event, now_s):
+            match effect:
+                case Word():
+                    self._say(effect, now_s)
+                case Settled():
+                    self._settle(effect)
+                case Note(level, text):
+                    self._log(level, text)
+                case WakeAt(time_s):
+                    self._tick_s = time_s
+
+    def _say(self, word: Word, now_s: float) -> None:
+        """Publish a word, and take it as all others do; without a lease nothing is said."""
+        warrant = self._allegiance.warrant(now_s)
+        if warrant is None or self._reign is None:
+            return
+        self._said += 1
+        authority = Authority(epoch=self._reign.epoch, leader=self._name, sequence=self._said)
+        body = Topology(authority=authority, warrant=warrant, committed=word.committed, proposal=word.proposal)
+        self._effects.append(Publish(body))
+        self._hear_word(body, self._name, self._allegiance.incarnation, now_s)
+
+    def _hear_word(self, word: Topology, sender: str, incarnation: int, now_s: float) -> None:
+        if self._allegiance.take("topology", word.authority, sender, incarnation, word.warrant, now_s):
+            return
+        fault = self.held.take(word)
+        if fault and fault != self._complaint:
+            self._log("warning", f"does not take the word of {sender}: {fault}")
+        self._complaint = fault
+        if word.proposal is not None or word.authority.epoch != self._epoch:
+            self._answer_at_s = AT_ONCE_S
+        self._epoch = word.authority.epoch
+
+    def _judge(self, now_s: float) -> None:
+        """Have those links judged that can be, as soon as the motion is accepted that they are about."""
+        links = self.held.to_judge()
+        if self._judging is not None or not links or self._allegiance.obeyed(now_s) is None:
+            return
+        orders = self._orders.in_force(now_s)
+        motion = None if orders is None else orders.motion
+        ready = tuple(link for link in links if self._is_accepted(link, orders))
+        scene = self._scene(motion, now_s)
+        if not scene.may_be:
+            ready = tuple(link for link in ready if self._agent not in link.ends)
+        if ready:
+            assert self.held.proposal is not None
+            self._judging = self.held.proposal.tree.number
+            self._effects.append(Compute(JUDGING, judge_links, (scene, self._name, ready)))
+
+    def _is_accepted(self, link: NewLink, orders: Deployment | None) -> bool:
+        """Whether this peer goes by the motion that a link is about."""
+        since, motion = link.since, None if orders is None else orders.motion
+        if since is None or orders is None or motion is None:
+            return since is None and orders is not None and motion is None
+        if (orders.authority.epoch, motion.plan, motion.revision) != (since.epoch, since.plan, since.revision):
+            return False
+        if self._body is None:
+            return True
+        own = None if self._body.state is None else self._body.state.progress
+        return own is not None and (own.epoch, own.plan, own.revision) == (since.epoch, since.plan, since.revision)
+
+    def _judged(self, done: JobDone) -> None:
+        number, self._judging = self._judging, None
+        if done.failure:
+            self._log("error", f"links could not be judged: {done.failure}")
+        elif number is not None:
+            views: tuple[LinkView, ...] = done.result
+            self.held.judge(number, views)
+
+    def _foreseen(self, done: JobDone, now_s: float) -> None:
+        """Propose what was wished, now that it is known from which stage on its links hold."""
+        wish, self._wish = self._wish, None
+        if wish is None or self._reign is None:
+            return
+        self._news = True
+        stages: Sequence[int | None] = [None] * len(wish.edges) if done.failure else done.result
+        blind = [edge for edge, stage in zip(wish.edges, stages, strict=True) if stage is None]
+        if blind:
+            why = done.failure or "their ends do not see each other where they come to a stop"
+            self._log("warning", f"does not propose the links {in_words(blind)}: {why}")
+            return
+        motion, epoch = wish.motion, self._reign.epoch
+        since = {
+            frozenset(edge): Milestone(epoch=epoch, plan=motion.plan, revision=motion.revision, stage=stage)
+            for edge, stage in zip(wish.edges, stages, strict=True)
+            if motion is not None and stage is not None
+        }
+        self._negotiate(Propose(wish.members, wish.edges, since, wish.method, wish.reason), now_s)
+
+    def _settle(self, done: Settled) -> None:
+        self._news = True
+        proposal, before = done.proposal, done.before
+        self._effects.append(
+            Record(
+                TopologyChange(
+                    number=proposal.tree.number,
+                    committed=done.committed,
+                    before=() if before is None else before.edges,
+                    edges=proposal.tree.edges,
+                    new=tuple(link.ends for link in proposal.links),
+                    released=proposal.released,
+                    method=proposal.method,
+                    rounds=proposal.round + 1,
+                    duration_s=done.duration_s,
+                    reason=done.reason,
+                )
+            )
+        )
+
+    def _confirm(self, now_s: float) -> None:
+        """Say the standing answer if it is another one, or due; the leader takes its own as any other."""
+        answer = self.held.confirmation
+        if answer == self._answer and now_s < self._answer_at_s:
+            return
+        self._answer, self._answer_at_s = answer, now_s + ANSWER_S
+        self._effects.append(Publish(answer))
+        if self._allegiance.leads(now_s):
+            self._negotiate(core.Heard(self._name, self._allegiance.incarnation, answer), now_s)
+
+    def _scene(self, motion: Motion | None, now_s: float) -> Scene:
+        states = {name: self._others.state(name) for name in self._voters}
+        if self._body is not None:
+            states[self._name] = self._body.state
+        base = self._voters[0]
+        places = {base: self._starts[base]}
+        places |= {name: state.position for name, state in states.items() if state is not None}
+        return Scene(self._environment, motion, places, self._agent, self._agent_places(now_s))
+
+    def _agent_places(self, now_s: float) -> Sequence[Point]:
+        """Where the agent may be, as far as this peer knows; empty: it does not."""
+        if self._may_be is not None:
+            return self._may_be(now_s)
+        intent = self._others.intent()
+        return () if intent is None else places_on(intent.path or (intent.position,))
+
+    def _log(self, level: Literal["info", "warning", "error"], text: str) -> None:
+        self._effects.append(Record(LogLine(level=level, text=text)))
