@@ -19,13 +19,12 @@ from agents.shell import PeerShell
 from protocol.bus import BusEvent
 from protocol.inbox import Inbox
 from protocol.promises import decode_promise
-from protocol.promises import decode_promise
 
 if TYPE_CHECKING:
     from agents.casting import Casting
     from agents.driver import DiscDriver
     from agents.mission import Mission
-    from protocol.messages import Point, Reign
+    from protocol.messages import Point
     from protocol.simulated_bus import SimulatedNetwork, VirtualTime
 
 APart = TypeVar("APart")
@@ -251,11 +250,6 @@ class SimulatedPeer:
 
     def close(self) -> None:
         """The bus of its shell; it is closed by :meth:`kill`."""
-
-    def _read_promise(self) -> Reign | None:
-        """What the processes before have promised, as far as the disk still knows."""
-        disk, team = self.disk.content, self._mission.team
-        return decode_promise(disk, file="the disk", team=team, voter=self.name, incarnation=self.incarnation)
 
     def _take(self, event: BusEvent) -> None:
         if self._waiting is None:
