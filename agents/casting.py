@@ -120,7 +120,7 @@ class Casting:
         speed_m_s, agent = mission.agent_speed_m_s, mission.tracked_agent
         space = self._space(mission.agent_radius_m, agent.start)
         home = mission.base_station.start
-        roaming = None if mission.announces else Roaming(self._environment, space.geodesics, speed_m_s, home)
+        roaming = None if mission.announces else Roaming(space.geodesics, speed_m_s, home)
         return TeamPlanner(self._environment, deployments, motions, speed_m_s, roaming)
 
     def _build_planner(self) -> DeploymentPlanner:

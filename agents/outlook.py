@@ -109,6 +109,7 @@ class Outlook:
     ) -> None:
         self._prospect = Prospect(environment, agent, agent_speed_m_s)
         self._geodesics, self._base, self._robots = geodesics, base, robots
+        self._here = geodesics.nearest(agent.center)
         walked_m = self._prospect.times_s * agent_speed_m_s
         self._walks = [(way, np.minimum(walked_m, length(way))) for way in agent.ways]
         self._driven_m = self._prospect.times_s * robot_speed_m_s
@@ -152,11 +153,11 @@ class Outlook:
     def _follow(self, name: str) -> Floats:
         """A spare's tracks (p, t, 2): to where the agent is, then after it, at a distance."""
         if name not in self._following:
-            tracks = []
-            for own, walked_m in self._walks:
-                to_agent = self._geodesics.path(self._robots[name], self._geodesics.nearest(own[0]))
-                behind_m = length(to_agent) + walked_m - self._distance_m
-                way = np.concatenate((to_agent, own[1:]))
-                tracks.append(walk(way, np.clip(behind_m, 0.0, self._driven_m)))
+            to_agent = self._geodesics.path(self._robots[name], self._here)
+            apart_m = length(to_agent) - self._distance_m
+            tracks = [
+                walk(np.concatenate((to_agent, own[1:])), np.clip(apart_m + walked_m, 0.0, self._driven_m))
+                for own, walked_m in self._walks
+            ]
             self._following[name] = np.stack(tracks)
         return self._following[name]

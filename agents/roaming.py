@@ -32,8 +32,9 @@ NODES: Final = 600
 GROWTHS_M: Final = (1.5, 4.0, 8.0)
 """Chains are considered for the set grown by so much."""
 
-SAMPLES: Final = 24
-"""So many places stand for the set, at most."""
+SAMPLES: Final = 16
+PITCH_M: Final = 0.3
+"""So many places stand for the set, at most, and no nearer to each other."""
 
 UNKNOWN: Final = 100
 """So many stand for the map."""
@@ -66,32 +67,36 @@ class Roaming:
     Args:
         geodesics: its shortest paths.
         speed_m_s: the most that it can go.
+        home: while nothing is known of it, robots wait on the way from there.
     """
 
-    def __init__(self, geodesics: GeodesicMap, speed_m_s: float) -> None:
-        self._geodesics, self._speed_m_s = geodesics, speed_m_s
+    def __init__(self, geodesics: GeodesicMap, speed_m_s: float, home: Point) -> None:
+        self._geodesics, self._speed_m_s, self._home = geodesics, speed_m_s, home
         self._nodes = _spread(geodesics)
         self._table = GeodesicTable(geodesics, self._nodes)
 
-    def whereabouts(self, target: TargetSet | None, drift_m_s: Point, gone_m: float) -> Whereabouts:
-        """Where the agent may be, at most so far from where it may be now.
+    def whereabouts(self, target: TargetSet | None, drift_m_s: Point, lead_s: float) -> Whereabouts:
+        """Where the agent may be in a moment.
 
         Args:
             target: where it may be now; None: anywhere.
             drift_m_s: how the middle of that has been moving.
-            gone_m: how far it may have gone until the time that is asked for.
+            lead_s: how long until then.
 
         Complexity: that of a row of a geodesic table for each of up to SAMPLES places, and of WAYS shortest paths.
         """
         if target is None:
             return self._anywhere()
-        samples = thin(self._inside(np.array(target.samples)), SAMPLES)
+        samples = thin(self._inside(np.array([target.center, *target.samples])), SAMPLES, PITCH_M)
+        gone_m = self._speed_m_s * lead_s
+        drift = np.array(drift_m_s) * min(1.0, self._speed_m_s / max(math.hypot(*drift_m_s), 1e-9))
+        x, y = self._geodesics.nearest(samples[0] + lead_s * drift).tolist()
         rows = np.array([self._table.lengths(sample) for sample in samples])
         nearest, lengths = rows.argmin(axis=0), rows.min(axis=0)
         reach_m = self._speed_m_s * REACH_S
         ends = self._far_apart(np.flatnonzero((lengths > PIECE_M) & (lengths <= reach_m + gone_m)), lengths)
         going = [self._geodesics.path(samples[nearest[end]], self._nodes[end]) for end in ends]
-        chances = self._chances(going, drift_m_s)
+        chances = self._chances(going, drift)
         going = [tail(way, gone_m) for way in going]
         staying = [sample[None] for sample in thin(samples, STAYING)]
         stays = STAYS if going else 1.0
@@ -108,16 +113,15 @@ class Roaming:
             way = going[index]
             pieces = walk(way, np.arange(0.0, length(way) + PIECE_M, PIECE_M))
             aims.append(_aim(now, pieces, length(way), title, f"for {title} and the way to {name_place(way[-1])}"))
-        return Whereabouts(target.center, ways, likely, tuple(aims), announced=False)
+        return Whereabouts((x, y), ways, likely, tuple(aims), announced=False)
 
     def _anywhere(self) -> Whereabouts:
         """Of an agent of which nothing has been measured."""
         title = "an agent of which nothing is known yet"
         places = thin(self._nodes, UNKNOWN)
-        x, y = self._geodesics.nearest(places.mean(axis=0)).tolist()
         ways = tuple(place[None] for place in thin(places, WAYS))
         aims = (_aim(places, np.empty((0, 2)), 0.0, title, f"for {title}"),)
-        return Whereabouts((x, y), ways, np.full(len(ways), 1.0 / len(ways)), aims, announced=False)
+        return Whereabouts(self._home, ways, np.full(len(ways), 1.0 / len(ways)), aims, announced=False)
 
     def _inside(self, points: Floats) -> Floats:
         """Points, those too near to walls moved away from them."""
@@ -132,16 +136,16 @@ class Roaming:
         gaps = lengths[nodes].copy()
         while len(chosen) < WAYS and len(nodes) and gaps.max() > NEAR_M:
             chosen.append(int(nodes[gaps.argmax()]))
-            gaps = np.minimum(gaps, self._table.lengths(self._nodes[chosen[-1]])[nodes])
+            gaps = np.minimum(gaps, self._table.between[chosen[-1], nodes])
         return chosen
 
-    def _chances(self, ways: list[Floats], drift_m_s: Point) -> Floats:
+    def _chances(self, ways: list[Floats], drift_m_s: Floats) -> Floats:
         """How likely each of the ways is taken, of sum 1."""
         if not ways:
             return np.empty(0)
         begins = np.array([walk(way, np.array([NEAR_M]))[0] - way[0] for way in ways])
-        along = begins @ np.array(drift_m_s) / np.maximum(np.hypot(*begins.T), 1e-9) / self._speed_m_s
-        chances = np.exp(INSISTENCE * np.clip(along, -1.0, 1.0))
+        along = begins @ drift_m_s / np.maximum(np.hypot(*begins.T), 1e-9) / self._speed_m_s
+        chances = np.exp(INSISTENCE * along)
         return np.asarray(chances / chances.sum())
 
 
@@ -152,13 +156,11 @@ def _aim(now: Floats, later: Floats, ahead_m: float, title: str, whole: str) -> 
     return Aim(np.concatenate([now, later]), shares / shares.sum(), ahead_m, whole, part)
 
 
-def thin(points: Floats, number: int) -> Floats:
-    """So many of some points (m, 2), at most: the first, then always the one farthest from all before."""
-    if len(points) <= number:
-        return points
+def thin(points: Floats, number: int, pitch_m: float = 0.0) -> Floats:
+    """So many of some points (m, 2), at most: the first, then always the one farthest from those before, if it is."""
     chosen = [0]
     gaps = np.hypot(*(points - points[0]).T)
-    while len(chosen) < number and gaps.max() > 0.0:
+    while len(chosen) < number and gaps.max() > pitch_m:
         chosen.append(int(gaps.argmax()))
         gaps = np.minimum(gaps, np.hypot(*(points - points[chosen[-1]]).T))
     return points[chosen]

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+import shapely
 from msgspec import structs
 from numpy.typing import NDArray
 
@@ -78,17 +79,16 @@ class TeamPlanner:
     def _time_in_sight(self, watcher: Point, question: Question) -> float:
         """From the onset on; the agent may have gone anywhere until then."""
         speed_m_s = self._agent_speed_m_s
-        target = question.way[:1] if question.target is None else question.target.samples
-        if not target:
+        target = question.way[:1] if question.target is None else _hull(question.target.samples)
+        if not len(target):
             return 0.0
         return time_in_sight(self._environment, watcher, target, speed_m_s, question.lead_s * speed_m_s)
 
     def _expect(self, question: Question) -> Whereabouts:
         """Where the agent may be when the robots can begin to go."""
-        gone_m = question.lead_s * self._agent_speed_m_s
         if self._roaming is None:
-            return announce(tail(question.way, gone_m))
-        return self._roaming.whereabouts(question.target, question.drift_m_s, gone_m)
+            return announce(tail(question.way, question.lead_s * self._agent_speed_m_s))
+        return self._roaming.whereabouts(question.target, question.drift_m_s, question.lead_s)
 
     def _exchange(self, plan: Plan, robots: Mapping[str, Point], among: Collection[str], previous: Plan | None) -> Plan:
         """The same places, but none of some robots overtakes another: the search for relays does not ask that."""
@@ -119,6 +119,11 @@ def _option(plan: Plan, before: Plan | None, robots: Collection[str]) -> Option:
 def _last_relay(plan: Plan) -> str | None:
     relays = [placement.robot for placement in plan.placements if not placement.spare]
     return relays[-1] if relays else None
+
+
+def _hull(places: Sequence[Point]) -> Floats:
+    """The corners of the convex hull, (n, 2)."""
+    return np.asarray(shapely.get_coordinates(shapely.MultiPoint(places).convex_hull))
 
 
 def _points(places: Floats) -> list[Point]:
