@@ -72,7 +72,8 @@ class Election:
 
     Args:
         roster: of the team; peers without a vote take part to learn whom to obey.
-        team, name, incarnation: of this peer. An incarnation must never be used twice.
+        team, name, incarnation: of this peer. An incarnation must never be used twice; 0 says that no process has borne
+            the name before.
         promise: what :func:`protocol.promises.decode_promise` found.
         seed: of the waiting times.
         now_s: the present time.
@@ -86,7 +87,7 @@ class Election:
         self.office: Reign | None = None
         """The reign that it leads in; None while it does not lead."""
         votes = name in roster.voters
-        self._voter = Voter(promise, LEASE_S, now_s)
+        self._voter = Voter(promise, LEASE_S, now_s, first=incarnation == 0)
         self.obedience = Obedience(name, incarnation, LEASE_S, self._voter if votes else None)
         """Judges orders, one's own too."""
         self.lease_until_s = -math.inf

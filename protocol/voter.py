@@ -6,7 +6,7 @@ voter says for it, by the voter's own clock, and while it runs nobody else is pr
 =========  ============================================================================================
 renew      the reign of the last promise, at any time: the promise runs anew; nothing is written
 promise    a higher epoch, if the last promise has run out, or is one to the same process of the same peer
-rest       nothing at all for one lease after the start: a promise may be running that was forgotten
+rest       nothing at all for one lease after a restart: a promise may be running that was forgotten
 =========  ============================================================================================
 
 A promise is said when it is on disk. While it is being written it binds already.
@@ -26,14 +26,15 @@ class Voter:
         promise: the last one on disk; None if there is no file.
         lease_s: how long a promise runs.
         now_s: when the process began.
+        first: whether no process has borne the name before, so that nothing can have been promised.
     """
 
-    def __init__(self, promise: Reign | None, lease_s: float, now_s: float) -> None:
+    def __init__(self, promise: Reign | None, lease_s: float, now_s: float, *, first: bool = False) -> None:
         self.promise = promise
         """The last one made; it is on disk."""
         self.runs_until_s = -math.inf
         """Until when the last promise binds; after a start :attr:`rests_until_s` stands in for it."""
-        self.rests_until_s = now_s + lease_s
+        self.rests_until_s = now_s if first else now_s + lease_s
         """Before this nothing is promised or renewed."""
         self.writing: Reign | None = None
         """The promise that is on its way to the disk."""
