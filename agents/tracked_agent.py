@@ -1,6 +1,8 @@
-"""The tracked agent: walks by itself or where an operator sends it, and announces position, goal and path.
+"""The tracked agent's body: walks by itself or where an operator sends it.
 
-It is independent: nobody of the team tells it where to go, and it waits for nobody.
+Nobody of the team tells it where to go, and it waits for nobody. If it announces, it says position, goal and path. Else
+it is *independent* in this too: the others hear that it lives, and how far it is (:mod:`agents.ranging`); where it is goes
+into the recording only.
 
 =======  ====================================================
 waiting  has had no goal yet
@@ -11,6 +13,7 @@ arrived  rests at its goal
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Final, Literal
 
@@ -20,10 +23,9 @@ from agents.mission import Mission, OnDemand
 from agents.path_follower import STANDING, Leg, PathFollower, Routes, Unreachable
 from agents.records import LogLine
 from agents.rhythm import EARLY_S
-from agents.role import Drive, Effect, Event, Heard, JobDone, Publish, Record, WakeAt, Woken, Written
+from agents.role import Drive, Effect, Event, Heard, Publish, Record, Woken
 from agents.self_report import SelfReport
 from planning.environment import Environment
-from protocol.bus import PeerAppeared, PeerVanished
 from protocol.messages import Goal, GoalReply, Intent, Mode, Point
 
 REMEMBERED_GOALS: Final = 256
@@ -37,16 +39,21 @@ class TrackedAgent:
     """Walks from goal to goal; a goal of an operator interrupts the behaviour, which goes on afterwards.
 
     Args:
-        mission: rates, speed, radius and rests.
+        mission: rates, speed, radius and rests, and whether it announces.
         free: where its centre can be: the map inflated by its radius.
         routes: geodesics of ``free``.
         routine: where it goes by itself.
+        now_s: the present time by its clock.
     """
 
     hears = frozenset({"goal"})
 
-    def __init__(self, mission: Mission, free: Environment, routes: Routes, routine: Routine) -> None:
+    def __init__(
+        self, mission: Mission, free: Environment, routes: Routes, routine: Routine, now_s: float = 0.0
+    ) -> None:
         self._mission = mission
+        self._announces = mission.announces
+        self._report = SelfReport(mission, "tracked_agent", mission.agent_radius_m, now_s)
         self._free = free
         self._routine = routine
         self._follower = PathFollower(routes, mission.agent_speed_m_s)
@@ -62,12 +69,18 @@ class TrackedAgent:
         self._patience_s = patience_s(mission.control_hz)
         self._mode: Mode = "waiting"
         self._leg: Leg = STANDING
+        self._leg_ends_s = math.inf
         self._logs: list[Effect] = []
 
-    def start(self, now_s: float, position: Point) -> Sequence[Effect]:
-        """Begin the two rhythms: control with intent, and heartbeat."""
-        self._report = SelfReport(self._mission, "tracked_agent", self._mission.agent_radius_m, now_s)
-        return self._live(now_s, position)
+    @property
+    def next_s(self) -> float:
+        """When it has something to say, the end of a leg or of a rest; at once when it has been sent somewhere."""
+        if self._ordered is not None:
+            return -math.inf
+        wake_s = self._report.next_s
+        if self._mode == "moving":
+            return min(wake_s, self._leg_ends_s)
+        return min(wake_s, self._idle_until_s)
 
     def handle(self, event: Event, now_s: float) -> Sequence[Effect]:
         """Answer goals when they arrive; walk when woken."""
@@ -99,7 +112,7 @@ class TrackedAgent:
         self._answers[asked] = reply
         if len(self._answers) > REMEMBERED_GOALS:
             del self._answers[next(iter(self._answers))]
-        return (Publish(reply), log, WakeAt(now_s))
+        return (Publish(reply), log)
 
     def _live(self, now_s: float, position: Point) -> Sequence[Effect]:
         self._decide(now_s, position)
@@ -115,8 +128,8 @@ class TrackedAgent:
             goal=self._follower.target,
             path=self._follower.remaining(position),
         )
-        effects += self._report.due(now_s, intent)
-        effects.append(WakeAt(self._next_wake_s(now_s)))
+        self._leg_ends_s = now_s + self._leg.lasts_s
+        effects += self._report.due(now_s, intent, silent=not self._announces)
         return effects
 
     def _decide(self, now_s: float, position: Point) -> None:
@@ -146,12 +159,6 @@ class TrackedAgent:
         self._idle_until_s = max(self._idle_until_s, now_s + self._pause_s)
         if not self._on_order:
             self._routine.reached()
-
-    def _next_wake_s(self, now_s: float) -> float:
-        wake_s = self._report.next_s
-        if self._mode == "moving":
-            return min(wake_s, now_s + self._leg.lasts_s)
-        return min(wake_s, max(self._idle_until_s, now_s))
 
     def _log(self, level: Literal["info", "warning"], text: str) -> None:
         self._logs.append(Record(LogLine(level=level, text=text)))
