@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from agents.allegiance import Allegiance
@@ -13,11 +14,14 @@ from agents.certificate_judge import certificate_judge
 from agents.collection import Collection
 from agents.driver import DiscDriver
 from agents.leadership import Leadership
-from agents.mind import Mind
+from agents.mind import Mind, Part
 from agents.mission import Mission, RosterEntry
 from agents.planning_job import Answer, Question
+from agents.ranging import Ranging, Transponder
 from agents.robot import Robot
 from agents.role import Role
+from agents.shared_estimate import SharedEstimate
+from agents.sighted_set import Sight
 from agents.standing_orders import StandingOrders
 from agents.tracked_agent import TrackedAgent
 from planning.compiled_map import CompiledMap
@@ -49,6 +53,8 @@ class Casting:
         self._known_team_planner: TeamPlanner | None = None
         self._spaces: list[CompiledMap] = []
         self._judge = certificate_judge(mission, environment)
+        self.estimates: dict[str, SharedEstimate] = {}
+        """The part of each mind cast last that knows where an independent agent may be, by its peer."""
 
     def cast(
         self, name: str, *, incarnation: int = 0, promise: Reign | None = None, now_s: float = 0.0
@@ -69,20 +75,21 @@ class Casting:
         if entry.role == "tracked_agent":
             radius_m, speed_m_s = mission.agent_radius_m, mission.agent_speed_m_s
             space = self._space(radius_m, entry.start)
-            role: Role = TrackedAgent(mission, space.free, space.geodesics, begin(mission, space.free))
+            body = TrackedAgent(mission, space.free, space.geodesics, begin(mission, space.free), now_s)
+            role: Role = Mind([body] if mission.announces else [body, Transponder(mission, self._environment)])
         else:
             allegiance = Allegiance(
                 mission.voters, team=mission.team, name=name, incarnation=incarnation, promise=promise,
                 seed=mission.seed, heartbeat_s=1.0 / mission.heartbeat_hz, now_s=now_s,
             )  # fmt: skip
-            role = self._compose(entry, allegiance, now_s)
+            role = self._compose(entry, allegiance, incarnation, now_s)
             radius_m, speed_m_s = mission.robot_radius_m, mission.robot_speed_m_s
         if entry.role == "base_station":
             return role, DiscDriver(entry.start, 0.0)
         room = self._space(max(radius_m - CLEARANCE_M, 0.0), entry.start).free
         return role, DiscDriver(entry.start, speed_m_s, room)
 
-    def _compose(self, entry: RosterEntry, allegiance: Allegiance, now_s: float) -> Mind:
+    def _compose(self, entry: RosterEntry, allegiance: Allegiance, incarnation: int, now_s: float) -> Mind:
         """The mind of a peer with a vote: whom it follows, what it knows, its body, and leading. In this order."""
         mission = self._mission
         orders, collection = StandingOrders(allegiance), Collection(allegiance, mission.tracked_agent.name)
@@ -92,7 +99,18 @@ class Casting:
         else:
             robot, body = None, BaseStation(mission, self._environment, orders, collection, now_s)
         leadership = Leadership(mission, allegiance, orders, collection, _Planner(self.team_planner), robot, now_s)
-        return Mind([allegiance, orders, collection, body, leadership])
+        knowing: list[Part] = [allegiance, orders, collection]
+        if not mission.announces:
+            self.estimates[entry.name] = estimate = SharedEstimate(mission, entry.name, incarnation, self._sight)
+            knowing += [estimate, Ranging(mission, entry.name, estimate)]
+        return Mind([*knowing, body, leadership])
+
+    @cached_property
+    def _sight(self) -> Sight:
+        """For the estimate: where the agent's body can be, and from where it is seen."""
+        mission = self._mission
+        room = self._space(max(mission.agent_radius_m - CLEARANCE_M, 0.0), mission.tracked_agent.start).free
+        return Sight(self._environment, room)
 
     def planner(self) -> DeploymentPlanner:
         """The planner of the team's leader; built when it is first asked for.

@@ -34,11 +34,20 @@ class SelfReport:
         """When something is due next."""
         return min(self._control.next_s, self._heartbeat.next_s)
 
-    def due(self, now_s: float, body: State | Intent, *, urgent: bool = False) -> list[Effect]:
-        """What is to be said and recorded now; ``body`` is said, but not recorded, before its time if it is urgent."""
+    def due(
+        self, now_s: float, body: State | Intent, *, urgent: bool = False, silent: bool = False
+    ) -> list[Effect]:
+        """What is to be said and recorded now.
+
+        Args:
+            now_s: the time.
+            body: what there is to say.
+            urgent: it is said, but not recorded, before its time.
+            silent: it is recorded only.
+        """
         effects: list[Effect] = []
         due = self._control.due(now_s)
-        if due or urgent:
+        if (due or urgent) and not silent:
             effects.append(Publish(body))
         if due:
             track = Track(
