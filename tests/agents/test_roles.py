@@ -114,7 +114,7 @@ def make_robot() -> Role:
 
 
 def make_agent() -> Role:
-    return TrackedAgent(MISSION, FREE, ROUTES, begin(MISSION, FREE))
+    return Casting(MISSION, CORNER).cast("agent")[0]
 
 
 @pytest.mark.parametrize("make", [make_base, make_robot, make_agent])
