@@ -1,8 +1,8 @@
 """The tracked agent's body: walks by itself or where an operator sends it.
 
 Nobody of the team tells it where to go, and it waits for nobody. If it announces, it says position, goal and path. Else
-it is *independent* in this too: the others hear that it lives, and how far it is (:mod:`agents.ranging`); where it is goes
-into the recording only.
+it is *independent* in this too: the others hear that it lives, and how far it is (:mod:`agents.ranging`); where it is
+goes into the recording only.
 
 =======  ====================================================
 waiting  has had no goal yet
@@ -88,11 +88,11 @@ class TrackedAgent:
             case Woken(position):
                 return self._live(now_s, position)
             case Heard(address, envelope) if isinstance(envelope.body, Goal):
-                return self._answer(address.speaker, envelope.body, now_s)
-            case Heard() | JobDone() | Written() | PeerAppeared() | PeerVanished():
+                return self._answer(address.speaker, envelope.body)
+            case _:
                 return ()
 
-    def _answer(self, operator: str, goal: Goal, now_s: float) -> Sequence[Effect]:
+    def _answer(self, operator: str, goal: Goal) -> Sequence[Effect]:
         asked = (operator, goal.correlation)
         known = self._answers.get(asked)
         if known is not None:

@@ -4,6 +4,7 @@ import pytest
 from msgspec import structs
 
 from agents.behaviour import begin
+from agents.mind import Mind
 from agents.mission import Behaviour, Mission, OnDemand, Scripted, Wandering
 from agents.records import Track
 from agents.role import Heard
@@ -21,7 +22,8 @@ START = (1.0, 1.0)
 def walk(corner: Environment, behaviour: Behaviour) -> Life:
     mission: Mission = structs.replace(make_mission(), behaviour=behaviour)
     free = corner.inflated(mission.agent_radius_m, containing=START)
-    return Life(TrackedAgent(mission, free, GeodesicMap(free), begin(mission, free)), START, mission.agent_speed_m_s)
+    agent = TrackedAgent(mission, free, GeodesicMap(free), begin(mission, free))
+    return Life(Mind([agent]), START, mission.agent_speed_m_s)
 
 
 def ask(goal: Point, correlation: str, operator: str = "anna") -> Heard:
@@ -129,7 +131,7 @@ def test_memory_of_goals_is_bounded(corner: Environment) -> None:
     life = walk(corner, OnDemand())
     for number in range(3 * REMEMBERED_GOALS):
         life.hear(ask((2.0, 1.0), str(number)))
-    assert len(life.role._answers) == REMEMBERED_GOALS  # type: ignore[attr-defined]
+    assert len(life.role.parts[0]._answers) == REMEMBERED_GOALS  # type: ignore[attr-defined]
 
 
 def test_a_script_leaves_out_what_it_cannot_reach(corner: Environment) -> None:
