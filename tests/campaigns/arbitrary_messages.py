@@ -1,0 +1,206 @@
+"""Messages that nobody should send: noise, confused types, mutants of good ones, and good ones that make no sense.
+
+What peers have said is remembered, and turns up again in what is made: names of moments and of rounds, epochs, plans.
+So what is made is believed often enough to get past the first checks, and deep into what a peer does with it.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import deque
+from collections.abc import Sequence
+from random import Random
+from typing import Any, Final
+
+import msgspec
+from msgspec import inspect as types
+
+from protocol.bus import BusEvent, PeerAppeared, PeerVanished, Received
+from protocol.keys import Address
+from protocol.messages import BODIES, MAXIMUM_PAYLOAD_BYTES, AnyBody, Body, Envelope, encode, kind_of
+from protocol.schemas import EXAMPLES
+
+ODD: Final[tuple[Any, ...]] = (
+    None, True, False, 0, -1, 1, 2**53, 2**63, -(2**63), 10**40, 0.0, -0.0, 1e-300, 1e300, -1e7, 1.5, "", "\x00", "NaN",
+    "base", "robot1", "a" * 1000, "\ud7ff\U0010ffff", [], {}, [[]], [[[[[[[[]]]]]]]], {"kind": "state"}, [1e7, -1e7],
+)  # fmt: skip
+"""JSON values for places where they do not belong."""
+
+BAD_KEYS: Final = (
+    "", "/", "team", "team/v1", "team/v1/robot1", "team/v1//state", "team/v2/robot1/state", "other/v1/robot1/state",
+    "team/v1/robot1/state/more", "team/v1/operator/state", "team/v1/operator/robot1/state", "team/v1/nobody/state",
+    "team/v1/robot1/alive", "team/v1/robot1/no_such_kind", "team/v1/robot1/**", "team/v1/\u0000/state",
+)  # fmt: skip
+
+
+class Mischief:
+    """A source of events, each different, all from one seed.
+
+    Args:
+        seed: of everything.
+        team: whose keys it uses.
+        names: of the peers in whose name it speaks.
+    """
+
+    def __init__(self, seed: int, team: str, names: Sequence[str]) -> None:
+        self.chance = Random(seed)
+        self._team = team
+        self._names = tuple(names)
+        self._sequence = 0
+        self._said: deque[Received] = deque(maxlen=200)
+        self._texts: deque[str] = deque(["x"], maxlen=40)
+        self._numbers: deque[int] = deque([0, 1], maxlen=40)
+
+    def overhear(self, envelope: Envelope) -> None:
+        """Remember what a peer has said."""
+        self._gather(msgspec.to_builtins(envelope.body))
+
+    def event(self) -> BusEvent:
+        """The next thing to happen to a peer."""
+        draw = self.chance.random()
+        if draw < 0.02:
+            return self.chance.choice((PeerAppeared, PeerVanished))(self.chance.choice((*self._names, "nobody", "")))
+        if draw < 0.10:
+            return Received(self._key(), self.chance.randbytes(int(self.chance.expovariate(0.02))))
+        if draw < 0.15 and self._said:
+            return self.chance.choice(self._said)  # once more, and late
+        if draw < 0.40:
+            return self._remember(self._sane(self._body()))
+        if draw < 0.60:
+            return self._mutate(self._sane(self.chance.choice(EXAMPLES)))
+        if draw < 0.80:
+            return self._confuse(self._sane(self._body()))
+        if draw < 0.802:
+            sane = self._sane(self.chance.choice(EXAMPLES))
+            return Received(sane.key, sane.payload + b" " * MAXIMUM_PAYLOAD_BYTES)
+        return self._remember(self._misplace(self._body()))
+
+    def _remember(self, event: Received) -> Received:
+        self._said.append(event)
+        return event
+
+    def _sane(self, body: AnyBody, name: str = "") -> Received:
+        """A message as a peer would send it."""
+        self._sequence += 1
+        operator = kind_of(body) == "goal"
+        name = name or ("ada" if operator else self.chance.choice(self._names))
+        envelope = Envelope(
+            sender=name,
+            incarnation=self.chance.choice((0, 0, 0, 1, self._sequence // 500)),
+            sequence=self._sequence,
+            sent_at_s=float(self._sequence),
+            body=body,
+        )
+        return Received(Address(self._team, name, kind_of(body), operator=operator).key, encode(envelope))
+
+    def _misplace(self, body: AnyBody) -> Received:
+        """Under a key that is not its own, or old."""
+        sane = self._sane(body)
+        if self.chance.random() < 0.5:
+            return Received(self._key(), sane.payload)
+        self._sequence = max(0, self._sequence - self.chance.randrange(5))
+        return sane
+
+    def _key(self) -> str:
+        if self.chance.random() < 0.3:
+            return self.chance.choice(BAD_KEYS)
+        name, kind = self.chance.choice(self._names), self.chance.choice((*BODIES, "alive"))
+        return Address(self._team, name, kind, operator=self.chance.random() < 0.1).key
+
+    def _mutate(self, event: Received) -> Received:
+        """Some bytes changed, cut out or doubled."""
+        payload = bytearray(event.payload)
+        for _ in range(self.chance.randrange(1, 5)):
+            place = self.chance.randrange(len(payload)) if payload else 0
+            match self.chance.randrange(4):
+                case 0:
+                    payload[place : place + 1] = self.chance.randbytes(1)
+                case 1:
+                    del payload[place : place + self.chance.randrange(1, 20)]
+                case 2:
+                    payload[place:place] = payload[place : place + self.chance.randrange(1, 40)]
+                case 3:
+                    payload[place : place + 1] = self.chance.choice((b"0", b"9", b"-", b"e9", b'"', b"[", b"}", b"\\u"))
+        return Received(event.key, bytes(payload))
+
+    def _confuse(self, event: Received) -> Received:
+        """Valid JSON in which some values are of another kind, missing, or too many."""
+        value = json.loads(event.payload)
+        for _ in range(self.chance.randrange(1, 3)):
+            self._spoil(value)
+        return Received(event.key, json.dumps(value).encode("utf-8", "surrogatepass"))
+
+    def _spoil(self, value: Any) -> None:
+        while isinstance(value, dict | list) and value:
+            place: Any = self.chance.choice(list(value) if isinstance(value, dict) else range(len(value)))
+            if isinstance(value[place], dict | list) and value[place] and self.chance.random() < 0.75:
+                value = value[place]
+                continue
+            match self.chance.randrange(4):
+                case 0:
+                    del value[place]
+                case 1 if isinstance(value, list):
+                    value.extend(value[:] * self.chance.randrange(1, 200 // len(value) + 2))
+                case _:
+                    value[place] = self.chance.choice((*ODD, *self._texts, *self._numbers))
+            return
+
+    def _body(self) -> AnyBody:
+        """A valid body of any kind, with any content that its types allow."""
+        kind: type[Body] = self.chance.choice(list(BODIES.values()))
+        body: AnyBody = msgspec.convert(self._value(types.type_info(kind)), kind)  # type: ignore[assignment]
+        return body
+
+    def _value(self, kind: Any) -> Any:
+        chance = self.chance
+        match kind:
+            case types.StructType(fields=fields):
+                content = {
+                    field.encode_name: self._value(field.type)
+                    for field in fields
+                    if field.required or chance.random() < 0.8
+                }
+                return content | ({kind.tag_field: kind.tag} if kind.tag_field else {})
+            case types.UnionType(types=choices):
+                return self._value(chance.choice(choices))
+            case types.LiteralType(values=values):
+                return chance.choice(values)
+            case types.BoolType():
+                return chance.random() < 0.5
+            case types.NoneType():
+                return None
+            case types.IntType():
+                return self._number(kind.ge or 0, kind.le)
+            case types.FloatType(ge=least, le=most):
+                return self._measure(least, most)
+            case types.StrType(pattern=None):
+                return chance.choice(self._texts)[: kind.max_length or 64] or "x"
+            case types.StrType():
+                return chance.choice(self._names)
+            case types.TupleType(item_types=items):
+                return [self._value(item) for item in items]
+            case types.VarTupleType():
+                most = min(kind.max_length or 12, chance.choice((0, 1, 2, 3, 12)))
+                return [self._value(kind.item_type) for _ in range(max(kind.min_length or 0, most))]
+        raise NotImplementedError(f"{kind} in a message: say here how to make one up")
+
+    def _number(self, least: int, most: int | None) -> int:
+        number = self.chance.choice((*self._numbers, 0, 1, 2, 3, 7, 2**32, 2**53 - 1))
+        return max(least, min(number + self.chance.choice((0, 0, 0, 1, -1)), 2**53 - 1 if most is None else most))
+
+    def _measure(self, least: float | None, most: float | None) -> float:
+        measure = self.chance.choice((0.0, 1.0, 2.5, self.chance.uniform(-2.0, 20.0), 1e-9, 1e7, -1e7, 1e300))
+        return max(-1e300 if least is None else least, min(measure, 1e300 if most is None else most))
+
+    def _gather(self, value: Any) -> None:
+        match value:
+            case dict():
+                for item in value.values():
+                    self._gather(item)
+            case list() | tuple():
+                for item in value:
+                    self._gather(item)
+            case str() if value not in BODIES:
+                self._texts.append(value)
+            case int() if not isinstance(value, bool):
+                self._numbers.append(value)

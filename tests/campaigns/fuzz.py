@@ -1,0 +1,251 @@
+"""Campaign: peers with real minds that are told anything: noise, confused types, mutants, replays, nonsense.
+
+    make fuzz
+    python -m tests.campaigns.fuzz --inputs 1000000 --seed 0
+
+Every peer lives for some thousand inputs in virtual time; then it must still say that it lives, must not have failed on
+anything, must have counted what it did not hear, and must not have grown or logged without bound. The campaign ends
+with status 1 and prints seed, input and traceback if one of that does not hold.
+
+With ``--guided`` the inputs come from atheris, if it is installed: libFuzzer, guided by which lines of the peer run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import sys
+import time
+import traceback
+from collections import Counter
+from collections.abc import Iterable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Final, Literal
+
+from agents.casting import Casting
+from agents.mission import Mission, OnDemand, RosterEntry
+from agents.records import AnyRecord, LogLine
+from agents.role import Compute, JobDone, Persist, Written
+from agents.shell import MAXIMUM_OPERATORS, PeerShell
+from planning.environment import Environment
+from protocol.bus import BusEvent, Received
+from protocol.keys import Address
+from protocol.messages import BODIES, decode
+from protocol.schemas import example_payloads
+from tests.campaigns.arbitrary_messages import Mischief
+
+NAMES: Final = ("base", "agent", "robot1", "robot2")
+LIFE: Final = 4000
+"""Inputs that one peer gets."""
+STEP_S: Final = 0.01
+"""Mission time between two inputs."""
+PLANS_EVERY: Final = 1000
+"""Of so many inputs one lets a planning job run; the other jobs never end, as if the machine were busy."""
+MOST_LINES: Final = 1500
+"""Log lines of a life; noise of one kind is logged once, but a peer may well say whom it obeys, again and again."""
+
+ROOMS = Environment([(0, 0), (8, 0), (8, 3), (9, 3), (9, 0), (17, 0), (17, 6), (0, 6)], name="two rooms")
+
+
+def make_mission() -> Mission:
+    """A small team in two rooms."""
+    starts = ((1.0, 1.0), (3.0, 3.0), (2.0, 1.0), (1.0, 2.0))
+    roles = ("base_station", "tracked_agent", "robot", "robot")
+    return Mission(
+        team="team",
+        map_path="map.json",
+        roster=tuple(
+            RosterEntry(name=name, role=role, start=start)  # type: ignore[arg-type]
+            for name, role, start in zip(NAMES, roles, starts, strict=True)
+        ),
+        behaviour=OnDemand(),
+        robot_radius_m=0.2,
+        agent_radius_m=0.2,
+        robot_speed_m_s=1.0,
+        agent_speed_m_s=1.0,
+        control_hz=10.0,
+        heartbeat_hz=2.0,
+        planning_period_s=0.5,
+        decomposition="inflection",
+        duration_s=None,
+        seed=0,
+        epoch_unix_s=0.0,
+    )
+
+
+class Witnessed(PeerShell):
+    """A shell that keeps the traceback of what its role failed on."""
+
+    traceback = ""
+
+    def _complain(self, level: Literal["warning", "error"], what: tuple[str, str], text: str) -> None:
+        if level == "error" and not self.traceback:
+            self.traceback = traceback.format_exc()
+        super()._complain(level, what, text)
+
+
+class Life:
+    """One peer with its mind, from its birth on; what it publishes goes to whoever makes mischief of it."""
+
+    def __init__(self, casting: Casting, name: str, mischief: Mischief | None) -> None:
+        self.name = name
+        self.now_s = 0.0
+        self.lines = self.published = self.given = 0
+        self._mischief = mischief
+        self._jobs: list[Compute] = []
+        self._promises: list[Persist] = []
+        role, driver = casting.cast(name)
+        self.role = role
+        self.shell = Witnessed(
+            role, driver, self, name=name, team="team", incarnation=0, peers=NAMES, now=lambda: self.now_s,
+            wall_clock=lambda: self.now_s, record=self._record, execute=self._jobs.append,
+            persist=self._promises.append,
+        )  # fmt: skip
+        self.shell.start()
+
+    def publish(self, key: str, payload: bytes) -> None:
+        """Of the bus: what the peer says is well-formed, whatever it was told."""
+        envelope = decode(payload)
+        assert key == Address("team", self.name, envelope.kind).key
+        self.published += 1
+        if self._mischief is not None:
+            self._mischief.overhear(envelope)
+
+    def close(self) -> None:
+        """Of the bus."""
+
+    def give(self, event: BusEvent) -> None:
+        """Let something happen to the peer, and a little time pass."""
+        self.given += 1
+        self.shell.take(event)
+        while self._promises:
+            self.shell.written(Written(self._promises.pop(0).token, "disk full" if self.given % 97 == 0 else ""))
+        if self.given % PLANS_EVERY == 0 and self._jobs:
+            job = self._jobs[-1]
+            self._jobs.clear()
+            try:
+                result, failure = job.function(*job.arguments), ""
+            except Exception as problem:
+                result, failure = None, f"{type(problem).__name__}: {problem}"
+                self.shell.traceback = self.shell.traceback or traceback.format_exc()
+            self.shell.finish(JobDone(job.job, result, 0.1, failure))
+        self.now_s += STEP_S
+        if self.now_s >= self.shell.wake_at_s:
+            self.shell.wake()
+
+    def complaint(self) -> str:
+        """What is wrong with the peer by now; empty if all is well."""
+        if self.shell.traceback:
+            return f"failed:\n{self.shell.traceback}"
+        published = self.published
+        for _ in range(round(2.0 / STEP_S)):
+            self.give(Received("team/v1/nobody/heartbeat", b""))
+        if self.published == published:
+            return "says nothing any more"
+        if self.lines > MOST_LINES:
+            return f"logged {self.lines} lines"
+        if len(self.shell.refused) > 6 or len(self.shell._operators) > MAXIMUM_OPERATORS:
+            return "remembers without bound"
+        return ""
+
+    def _record(self, _: float, record: AnyRecord) -> None:
+        self.lines += isinstance(record, LogLine)
+
+
+def make_casting() -> Casting:
+    """Who makes peers; the planner is compiled once."""
+    casting = Casting(make_mission(), ROOMS)
+    casting.team_planner()
+    return casting
+
+
+def fuzz(inputs: int, first_seed: int, casting: Casting, names: Iterable[str] = NAMES[:3]) -> list[str]:
+    """Give so many inputs to one peer after the other; what went wrong."""
+    complaints: list[str] = []
+    refused: Counter[str] = Counter()
+    given, seed, shown = 0, first_seed, time.monotonic()
+    order = tuple(names)
+    while given < inputs:
+        name = order[seed % len(order)]
+        mischief = Mischief(seed, "team", NAMES)
+        life = Life(casting, name, mischief)
+        for _ in range(min(LIFE, inputs - given)):
+            life.give(mischief.event())
+            if life.shell.traceback:
+                break
+        given += life.given
+        if complaint := life.complaint():
+            complaints.append(f"seed {seed}, {name}, input {life.given}: {complaint}")
+        refused += life.shell.refused
+        seed += 1
+        if time.monotonic() - shown > 5.0:
+            shown = time.monotonic()
+            print(f"{given:,} of {inputs:,} inputs, {resident_mb():.0f} MB", file=sys.stderr, flush=True)
+    reasons = ", ".join(f"{count:,} {reason}" for reason, count in refused.most_common())
+    print(f"{given:,} inputs to {seed - first_seed} peers in turn; refused: {reasons}; {len(complaints)} complaints")
+    return complaints
+
+
+def fuzz_guided(inputs: int, casting: Casting) -> None:
+    """The same with inputs of atheris. Ends the process."""
+    import atheris
+
+    order, lives = list(BODIES), {name: Life(casting, name, None) for name in NAMES[:3]}
+    given = 0
+
+    def once(data: bytes) -> None:
+        nonlocal given
+        given += 1
+        name = NAMES[given % 3]
+        if given % LIFE < 3:
+            lives[name] = Life(casting, name, None)
+        kind = order[data[0] % len(order)] if data else "state"
+        speaker = NAMES[data[1] % 4] if len(data) > 1 else "robot1"
+        lives[name].give(Received(Address("team", speaker, kind, operator=kind == "goal").key, data[2:]))
+        if lives[name].shell.traceback:
+            raise AssertionError(f"{name} failed:\n{lives[name].shell.traceback}")
+
+    with TemporaryDirectory() as corpus:
+        for kind, payload in example_payloads().items():
+            sender = decode(payload).sender
+            first = bytes([order.index(kind), NAMES.index(sender) if sender in NAMES else 0])
+            (Path(corpus) / kind).write_bytes(first + payload)
+        atheris.instrument_all()
+        atheris.Setup(
+            [sys.argv[0], f"-runs={inputs}", "-max_len=4096", "-verbosity=0", "-print_final_stats=1", corpus], once
+        )
+        atheris.Fuzz()
+
+
+def resident_mb() -> float:
+    """The most memory that this process has had, MB."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+
+
+def main() -> int:
+    """Give the inputs; 1 if anything went wrong."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--inputs", type=int, default=1_000_000)
+    parser.add_argument("--seed", type=int, default=0, help="of the first peer")
+    parser.add_argument("--guided", action="store_true", help="with atheris")
+    options = parser.parse_args()
+    casting = make_casting()
+    if options.guided:
+        fuzz_guided(options.inputs, casting)
+        return 0
+    begun = time.perf_counter()
+    fuzz(options.inputs // 10, options.seed + 1_000_000, casting)  # what is loaded and cached on first use is there now
+    before_mb = resident_mb()
+    complaints = fuzz(options.inputs, options.seed, casting)
+    grown_mb = resident_mb() - before_mb
+    if grown_mb > 50.0:
+        complaints.append(f"{grown_mb:.0f} MB more after {options.inputs:,} inputs")
+    for complaint in complaints[:20]:
+        print(complaint)
+    print(f"{time.perf_counter() - begun:.0f} s, {grown_mb:.0f} MB more than after the first tenth")
+    return int(bool(complaints))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
