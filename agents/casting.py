@@ -53,8 +53,6 @@ class Casting:
         self._known_team_planner: TeamPlanner | None = None
         self._spaces: list[CompiledMap] = []
         self._judge = certificate_judge(mission, environment)
-        self.estimates: dict[str, SharedEstimate] = {}
-        """The part of each mind cast last that knows where an independent agent may be, by its peer."""
 
     def cast(
         self, name: str, *, incarnation: int = 0, promise: Reign | None = None, now_s: float = 0.0
@@ -101,7 +99,7 @@ class Casting:
         leadership = Leadership(mission, allegiance, orders, collection, _Planner(self.team_planner), robot, now_s)
         knowing: list[Part] = [allegiance, orders, collection]
         if not mission.announces:
-            self.estimates[entry.name] = estimate = SharedEstimate(mission, entry.name, incarnation, self._sight)
+            estimate = SharedEstimate(mission, entry.name, incarnation, self._sight)
             knowing += [estimate, Ranging(mission, entry.name, estimate)]
         return Mind([*knowing, body, leadership])
 
