@@ -157,10 +157,14 @@ class RerunRecorder:
 
     def log_blueprint(self, mission: Mission) -> None:
         """Say how the recording opens, once; called by one process of the team, after :meth:`log_map`."""
-        self._roles = {entry.name: entry.role for entry in mission.roster}
-        self._robots = [entry.name for entry in mission.robots]
+        self.know(mission)
         style(self._file, mission)
         self._file.open_with(lay_out_views(mission, self._bounds))
+
+    def know(self, mission: Mission) -> None:
+        """Learn who is who: any peer may come to lead, and then draws the tree of all."""
+        self._roles = {entry.name: entry.role for entry in mission.roster}
+        self._robots = [entry.name for entry in mission.robots]
 
     def record(self, time_s: float, peer: str, record: AnyRecord) -> None:
         """Write a record and draw it."""

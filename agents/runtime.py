@@ -47,6 +47,14 @@ _PR_SET_PDEATHSIG = 1
 _PR_SET_NAME = 15
 
 
+WOULD_JOIN_WRONGLY: Final = 2
+"""Exit status of a peer that must not take part as things are; its log says why. Starting it again changes nothing."""
+
+
+class AlreadyRun(Exception):
+    """A process has been this incarnation before; the text says what to do."""
+
+
 class Ending:
     """The wish that this process end: SIGTERM or SIGINT."""
 
@@ -158,7 +166,7 @@ def live(
     promise = voter_file.read(team=mission.team, incarnation=incarnation) if name in mission.voters.voters else None
     role, driver = casting.cast(name, incarnation=incarnation, promise=promise, now_s=now())
     file = folder / "recordings" / f"{name}.{incarnation}.rrd"
-    recorder = _open_recorder(file, mission, folder.name, name, environment, casting)
+    recorder = _open_recorder(file, mission, name, incarnation, environment, casting)
 
     def record(time_s: float, what: AnyRecord) -> None:
         recorder.record(time_s, name, what)
@@ -231,16 +239,32 @@ def _read_mission(file: Path, name: str, position: str | None) -> Mission:
 
 
 def _open_recorder(
-    file: Path, mission: Mission, run: str, name: str, environment: Environment, casting: Casting
+    file: Path, mission: Mission, name: str, incarnation: int, environment: Environment, casting: Casting
 ) -> RerunRecorder:
-    """The recorder of a peer; that of the base station draws the map and says how the recording opens."""
+    """The recorder of a peer; that of the base station draws the map and says how the recording opens.
+
+    It does so beside the control loop, which takes a third of a second, and not again when it is started again.
+
+    Raises:
+        AlreadyRun: a process of this incarnation has recorded.
+    """
     from agents.recorder import RerunRecorder
 
-    recorder = RerunRecorder(file, team=mission.team, recording_id=run, peer=name)
-    if mission.entry(name).role == "base_station":
+    if file.exists():
+        raise AlreadyRun(
+            f"{file} exists, so that an earlier process was this incarnation of {name}, and what it promised and said "
+            f"would be mistaken for this one's; start {name} with an --incarnation of its own, greater than all before"
+        )
+    recorder = RerunRecorder(file, team=mission.team, recording_id=file.parent.parent.name, peer=name)
+    recorder.know(mission)
+
+    def draw() -> None:
         graph = casting.planner().graph
         recorder.log_map(environment, graph.outlines, graph.positions)
         recorder.log_blueprint(mission)
+
+    if mission.entry(name).role == "base_station" and incarnation == 0:
+        threading.Thread(target=draw, name="drawing", daemon=True).start()
     return recorder
 
 
@@ -261,12 +285,18 @@ def main(arguments: Sequence[str] | None = None, planner: DeploymentPlanner | No
     ending = Ending()
     if options.launcher is not None:
         tie_to(options.launcher)
+    from protocol.promises import VoterFileFault
+    from protocol.roster import RosterFault
+
     call_oneself(options.name)
     print(f"--- {options.name}, incarnation {options.incarnation}, process {os.getpid()}", flush=True)
     status = 0
     try:
         mission = _read_mission(options.mission, options.name, options.position)
         live(mission, options.mission.parent, options.name, options.incarnation, ending, planner)
+    except (AlreadyRun, RosterFault, VoterFileFault) as fault:
+        print(f"{options.name} does not join: {fault}", file=sys.stderr)
+        status = WOULD_JOIN_WRONGLY
     except Exception:
         traceback.print_exc()
         status = 1

@@ -22,6 +22,7 @@ from time import monotonic
 
 from agents.leader import DeploymentPlanner
 from agents.mission import Mission
+from agents.runtime import WOULD_JOIN_WRONGLY
 from agents.voter_file import VoterFile
 from launcher.processes import fork_peer, spawn, wait_for_end
 from launcher.run_folder import RECORDINGS
@@ -202,6 +203,10 @@ class Supervisor:
         """Note a crash and say so; how long to wait before a restart, None if there is to be none."""
         peer.crashes = [when for when in peer.crashes if monotonic() - when < STEADY_S] + [monotonic()]
         how = f"was killed by {signal.Signals(-status).name}" if status < 0 else f"ended with status {status}"
+        if status == WOULD_JOIN_WRONGLY:
+            peer.given_up = True
+            self._crashed(peer.name, f"{peer.name} must not join as things are: given up; see {self.log(peer)}")
+            return None
         if len(peer.crashes) > RESTARTS:
             peer.given_up = True
             self._crashed(
