@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from random import Random
 from typing import Any, Final
 
@@ -17,7 +17,7 @@ from msgspec import inspect as types
 
 from protocol.bus import BusEvent, PeerAppeared, PeerVanished, Received
 from protocol.keys import Address
-from protocol.messages import BODIES, MAXIMUM_PAYLOAD_BYTES, AnyBody, Body, Envelope, encode, kind_of
+from protocol.messages import BODIES, MAXIMUM_PAYLOAD_BYTES, AnyBody, Envelope, encode, kind_of
 from protocol.schemas import EXAMPLES
 
 ODD: Final[tuple[Any, ...]] = (
@@ -25,6 +25,12 @@ ODD: Final[tuple[Any, ...]] = (
     "base", "robot1", "a" * 1000, "\ud7ff\U0010ffff", [], {}, [[]], [[[[[[[[]]]]]]]], {"kind": "state"}, [1e7, -1e7],
 )  # fmt: skip
 """JSON values for places where they do not belong."""
+
+OPERATOR: Final = "ada"
+"""Who says what operators say."""
+
+SHAPES: Final = {kind: types.type_info(body) for kind, body in BODIES.items()}
+"""Types of all fields of all bodies."""
 
 BAD_KEYS: Final = (
     "", "/", "team", "team/v1", "team/v1/robot1", "team/v1//state", "team/v2/robot1/state", "other/v1/robot1/state",
@@ -40,12 +46,17 @@ class Mischief:
         seed: of everything.
         team: whose keys it uses.
         names: of the peers in whose name it speaks.
+        hearer: the one that is spoken to, who does not hear itself.
+        kinds: what is mostly said.
     """
 
-    def __init__(self, seed: int, team: str, names: Sequence[str]) -> None:
+    def __init__(self, seed: int, team: str, names: Sequence[str], hearer: str, kinds: Collection[str]) -> None:
         self.chance = Random(seed)
         self._team = team
         self._names = tuple(names)
+        self._speakers = tuple(name for name in names if name != hearer)
+        self._kinds = tuple(sorted(kinds))
+        self._incarnations = dict.fromkeys((*names, OPERATOR), 0)
         self._sequence = 0
         self._said: deque[Received] = deque(maxlen=200)
         self._texts: deque[str] = deque(["x"], maxlen=40)
@@ -67,11 +78,11 @@ class Mischief:
         if draw < 0.40:
             return self._remember(self._sane(self._body()))
         if draw < 0.60:
-            return self._mutate(self._sane(self.chance.choice(EXAMPLES)))
+            return self._mutate(self._sane(self._example()))
         if draw < 0.80:
             return self._confuse(self._sane(self._body()))
         if draw < 0.802:
-            sane = self._sane(self.chance.choice(EXAMPLES))
+            sane = self._sane(self._example())
             return Received(sane.key, sane.payload + b" " * MAXIMUM_PAYLOAD_BYTES)
         return self._remember(self._misplace(self._body()))
 
@@ -79,14 +90,15 @@ class Mischief:
         self._said.append(event)
         return event
 
-    def _sane(self, body: AnyBody, name: str = "") -> Received:
-        """A message as a peer would send it."""
+    def _sane(self, body: AnyBody) -> Received:
+        """A message as a peer would send it, whose process is mostly the one that spoke last."""
         self._sequence += 1
         operator = kind_of(body) == "goal"
-        name = name or ("ada" if operator else self.chance.choice(self._names))
+        name = OPERATOR if operator else self.chance.choice(self._speakers)
+        self._incarnations[name] += self.chance.random() < 0.005
         envelope = Envelope(
             sender=name,
-            incarnation=self.chance.choice((0, 0, 0, 1, self._sequence // 500)),
+            incarnation=max(0, self._incarnations[name] - (self.chance.random() < 0.02)),
             sequence=self._sequence,
             sent_at_s=float(self._sequence),
             body=body,
@@ -98,7 +110,7 @@ class Mischief:
         sane = self._sane(body)
         if self.chance.random() < 0.5:
             return Received(self._key(), sane.payload)
-        self._sequence = max(0, self._sequence - self.chance.randrange(5))
+        self._sequence = max(0, self._sequence - self.chance.randrange(3))
         return sane
 
     def _key(self) -> str:
@@ -127,7 +139,8 @@ class Mischief:
         """Valid JSON in which some values are of another kind, missing, or too many."""
         value = json.loads(event.payload)
         for _ in range(self.chance.randrange(1, 3)):
-            self._spoil(value)
+            # An envelope of the last incarnation that there can be would make all that follows it old.
+            self._spoil(value["body"] if isinstance(value.get("body"), dict) and self.chance.random() < 0.97 else value)
         return Received(event.key, json.dumps(value).encode("utf-8", "surrogatepass"))
 
     def _spoil(self, value: Any) -> None:
@@ -147,9 +160,12 @@ class Mischief:
 
     def _body(self) -> AnyBody:
         """A valid body of any kind, with any content that its types allow."""
-        kind: type[Body] = self.chance.choice(list(BODIES.values()))
-        body: AnyBody = msgspec.convert(self._value(types.type_info(kind)), kind)  # type: ignore[assignment]
+        kind = self.chance.choice(self._kinds)
+        body: AnyBody = msgspec.convert(self._value(SHAPES[kind]), BODIES[kind])  # type: ignore[assignment]
         return body
+
+    def _example(self) -> AnyBody:
+        return self.chance.choice(EXAMPLES)
 
     def _value(self, kind: Any) -> Any:
         chance = self.chance

@@ -88,15 +88,14 @@ class Witnessed(PeerShell):
 class Life:
     """One peer with its mind, from its birth on; what it publishes goes to whoever makes mischief of it."""
 
-    def __init__(self, casting: Casting, name: str, mischief: Mischief | None) -> None:
+    def __init__(self, casting: Casting, name: str, seed: int = 0) -> None:
         self.name = name
         self.now_s = 0.0
         self.lines = self.published = self.given = 0
-        self._mischief = mischief
         self._jobs: list[Compute] = []
         self._promises: list[Persist] = []
         role, driver = casting.cast(name)
-        self.role = role
+        self.mischief = Mischief(seed, "team", NAMES, name, role.hears)
         self.shell = Witnessed(
             role, driver, self, name=name, team="team", incarnation=0, peers=NAMES, now=lambda: self.now_s,
             wall_clock=lambda: self.now_s, record=self._record, execute=self._jobs.append,
@@ -109,8 +108,7 @@ class Life:
         envelope = decode(payload)
         assert key == Address("team", self.name, envelope.kind).key
         self.published += 1
-        if self._mischief is not None:
-            self._mischief.overhear(envelope)
+        self.mischief.overhear(envelope)
 
     def close(self) -> None:
         """Of the bus."""
@@ -168,10 +166,9 @@ def fuzz(inputs: int, first_seed: int, casting: Casting, names: Iterable[str] = 
     order = tuple(names)
     while given < inputs:
         name = order[seed % len(order)]
-        mischief = Mischief(seed, "team", NAMES)
-        life = Life(casting, name, mischief)
+        life = Life(casting, name, seed)
         for _ in range(min(LIFE, inputs - given)):
-            life.give(mischief.event())
+            life.give(life.mischief.event())
             if life.shell.traceback:
                 break
         given += life.given
@@ -191,7 +188,7 @@ def fuzz_guided(inputs: int, casting: Casting) -> None:
     """The same with inputs of atheris. Ends the process."""
     import atheris
 
-    order, lives = list(BODIES), {name: Life(casting, name, None) for name in NAMES[:3]}
+    order, lives = list(BODIES), {name: Life(casting, name) for name in NAMES[:3]}
     given = 0
 
     def once(data: bytes) -> None:
@@ -199,7 +196,7 @@ def fuzz_guided(inputs: int, casting: Casting) -> None:
         given += 1
         name = NAMES[given % 3]
         if given % LIFE < 3:
-            lives[name] = Life(casting, name, None)
+            lives[name] = Life(casting, name)
         kind = order[data[0] % len(order)] if data else "state"
         speaker = NAMES[data[1] % 4] if len(data) > 1 else "robot1"
         lives[name].give(Received(Address("team", speaker, kind, operator=kind == "goal").key, data[2:]))
