@@ -140,7 +140,7 @@ class Robot:
         return effects
 
     def _obey(self, now_s: float, position: Point) -> bool:
-        """Make the orders one's own as far as they can be followed; whether there is something to follow."""
+        """Make the orders one's own as far as they can be followed; whether there is something of theirs to follow."""
         orders = self._standing.in_force(now_s)
         if orders is None:
             return False
@@ -151,7 +151,8 @@ class Robot:
             self._halt(f"decision {orders.decision} has no way for {self._name}: holding")
         else:
             self._consider(orders.authority.epoch, orders.motion, position)
-        return self._follower.progress is not None
+        progress = self._follower.progress
+        return progress is not None and progress.epoch == orders.authority.epoch
 
     def _halt(self, why: str) -> None:
         if self._follower.progress is not None:
