@@ -14,6 +14,7 @@ from agents.mission import Mission
 from agents.sighted_set import Sight, SightedSet
 from estimation.range_log import Heard, Key, TimedRange
 from estimation.shared_ranges import Base, Digest
+from estimation.tight_set import TightSet
 from estimation.tight_snapshot import TightPiece, TightSnapshot
 from protocol.messages import ConvexPiece, HeardRanges, Point, RangeBase, RangeDigest, Ring, SharedRange
 
@@ -131,12 +132,13 @@ class Vetting:
             tuple((*ring.center, ring.inner_m, ring.outer_m) for ring in said.rings),
             said.rejections,
         )
-        state = SightedSet(self._sight)
+        tight = TightSet()
         try:
-            state.tight.restore(held)
+            tight.restore(held)
         except ValueError:
             return None
         key: Key = (said.time_s, source_of(said.owner, said.start), said.number)
+        state = SightedSet(self._sight, tight)
         return Base(key, state, self._heard(said.heard, said.time_s), said.fingerprint)
 
     def _heard(self, said: tuple[HeardRanges, ...], now_s: float) -> dict[str, Heard]:

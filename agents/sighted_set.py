@@ -7,9 +7,10 @@ set that the place of measuring does not see.
 
 from __future__ import annotations
 
-from copy import copy, deepcopy
+from copy import deepcopy
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import shapely
@@ -29,6 +30,25 @@ same places."""
 ROUNDING_M: Final = 1e-4
 """By this outlines of pieces are widened before they are joined, so that slivers are polygons too."""
 
+KEPT_STEPS: Final = 256
+"""Steps from one set to the next that are kept: the peers of a simulation replay the same ranges one after another."""
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """The agent may have moved so far, metres."""
+
+    distance_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """A range from a place in the agent's sight, and by how much it may be too long and too short, metres."""
+
+    anchor: Point
+    range_m: float
+    bound_m: tuple[float, float]
+
 
 class Sight:
     """What can be seen, and where the agent can be; one for all sets on a map.
@@ -43,13 +63,46 @@ class Sight:
         self.room = room
         self.ground = room.polygon
         """The same as ``room``."""
+        self.nothing = TightSet()
+        """What is known before the first range."""
         self.region = lru_cache(maxsize=KEPT_REGIONS)(self._region)
         """Of a place: all that it sees."""
+        self.step = lru_cache(maxsize=KEPT_STEPS)(self._step)
+        """The set after a step from another, as :meth:`_step` makes it."""
 
     def _region(self, place: Point) -> shapely.Polygon:
         region = visible_region(self.environment, place)
         shapely.prepare(region)
         return region
+
+    def _step(self, before: TightSet, step: Move | Seen) -> TightSet:
+        """The set after a step. Nobody changes a set that has been made, so that many can go on from it."""
+        after = deepcopy(before)
+        match step:
+            case Move(distance_m):
+                after.predict(distance_m)
+            case Seen(anchor, range_m, bound_m):
+                if after.measure(anchor, range_m, bound_m).accepted:
+                    self._drop_hidden(after, anchor, max(bound_m))
+        return after
+
+    def _drop_hidden(self, held: TightSet, anchor: Point, slack_m: float) -> None:
+        """Drop the pieces farther than this from all that the anchor sees."""
+        pieces = held.polygons
+        kept = self._have_seen_corners(anchor, pieces)
+        if kept.all():
+            return
+        hidden = np.flatnonzero(~kept)
+        kept[hidden] = shapely.dwithin(self.region(anchor), outlines([pieces[i] for i in hidden]), slack_m)
+        if kept.any() and not kept.all():
+            held.keep(kept)
+
+    def _have_seen_corners(self, anchor: Point, pieces: tuple[Floats, ...]) -> NDArray[np.bool_]:
+        """Which pieces have a corner in sight, which is quick to say, and true of most."""
+        corners = np.concatenate(pieces)
+        begins = np.cumsum([0, *map(len, pieces[:-1])])
+        in_sight = np.asarray(self.environment.line_of_sight(anchor, corners))
+        return np.asarray(np.logical_or.reduceat(in_sight, begins))
 
 
 class SightedSet:
@@ -57,16 +110,16 @@ class SightedSet:
 
     Args:
         sight: of the map.
+        tight: to go on from; to be changed by nobody from then on.
     """
 
-    def __init__(self, sight: Sight) -> None:
+    def __init__(self, sight: Sight, tight: TightSet | None = None) -> None:
         self._sight = sight
-        self.tight = TightSet()
+        self.tight = tight or sight.nothing
+        """What is left; to be read."""
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> SightedSet:
-        twin = copy(self)
-        twin.tight = deepcopy(self.tight, memo)
-        return twin
+    def __deepcopy__(self, memo: object) -> SightedSet:
+        return SightedSet(self._sight, self.tight)
 
     def measure(self, anchor_xy: ArrayLike, range_m: float, bound_m: float | tuple[float, float], /) -> None:
         """Take a range into account, and that the agent was seen.
@@ -75,30 +128,13 @@ class SightedSet:
         that the anchor sees is out.
         """
         x, y = np.asarray(anchor_xy, dtype=np.float64).tolist()
-        report = self.tight.measure((x, y), range_m, bound_m)
-        if not report.accepted:
-            return
-        pieces = self.tight.polygons
-        seen = self._have_seen_corners((x, y), pieces)
-        if seen.all():
-            return
-        slack_m = max(bound_m) if isinstance(bound_m, tuple) else bound_m
-        hidden = np.flatnonzero(~seen)
-        region = self._sight.region((x, y))
-        seen[hidden] = shapely.dwithin(region, outlines([pieces[i] for i in hidden]), slack_m)
-        if seen.any() and not seen.all():
-            self.tight.keep(seen)
+        below_m, above_m = bound_m if isinstance(bound_m, tuple) else (bound_m, bound_m)
+        self.tight = self._sight.step(self.tight, Seen((x, y), range_m, (below_m, above_m)))
 
     def predict(self, distance_m: float, /) -> None:
         """The agent may have moved so far; nothing before the first range."""
-        self.tight.predict(distance_m)
-
-    def _have_seen_corners(self, anchor: Point, pieces: tuple[Floats, ...]) -> NDArray[np.bool_]:
-        """Which pieces have a corner in sight, which is quick to say, and true of most."""
-        corners = np.concatenate(pieces)
-        begins = np.cumsum([0, *map(len, pieces[:-1])])
-        in_sight = np.asarray(self._sight.environment.line_of_sight(anchor, corners))
-        return np.asarray(np.logical_or.reduceat(in_sight, begins))
+        if self.tight.started and distance_m > 0.0:
+            self.tight = self._sight.step(self.tight, Move(distance_m))
 
 
 def outlines(pieces: list[Floats]) -> NDArray[np.object_]:
