@@ -9,7 +9,8 @@ take (:mod:`agents.whereabouts`), and takes the one under which the chain holds 
 - the cheapest chain (:mod:`agents.proposals`) for where the agent may be now, and for where it may be some metres on.
 
 Robots that are no relays are spares: they follow the agent at a distance, so that at the next corner the chain grows
-by the robot that is there already.
+by the robot that is there already. Around an agent that is only measured some of them spread out
+(:mod:`agents.pursuit`).
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from numpy.typing import NDArray
 
 from agents.outlook import Outlook
 from agents.proposals import Proposal, Proposer, relays_in_words
+from agents.pursuit import Pursuit
 from agents.spares import Waiting
 from agents.whereabouts import Whereabouts, name_place
 from planning.compiled_map import CompiledMap
@@ -84,6 +86,7 @@ class DeploymentPlanner:
         agent_name: name of the agent.
         robot_speed_m_s: of the robots, for the look ahead.
         agent_speed_m_s: of the agent, likewise.
+        range_bound_m: no distance to the agent that is measured is wrong by more.
 
     Raises:
         NoChain: the base station is outside the map.
@@ -106,6 +109,7 @@ class DeploymentPlanner:
         agent_name: str = "agent",
         robot_speed_m_s: float = 1.0,
         agent_speed_m_s: float = 1.0,
+        range_bound_m: float = 0.2,
     ) -> None:
         if not environment.contains([base])[0]:
             raise NoChain(f"{name_place(base)} is outside the map")
@@ -118,6 +122,10 @@ class DeploymentPlanner:
         self.graph = compiled.point_placements(spacing_m) if placements == "points" else compiled.cell_placements
         self._geodesics = self.graph.geodesics
         self._waiting = Waiting(self._geodesics, robot_radius_m, self.graph.positions)
+        self._pursuit = Pursuit(
+            environment, self._geodesics, apart_m=self._waiting.apart_m, agent_speed_m_s=agent_speed_m_s,
+            bound_m=range_bound_m,
+        )  # fmt: skip
         self._proposer = Proposer(
             self.graph, base, search, robot_speed_m_s=robot_speed_m_s, agent_speed_m_s=agent_speed_m_s,
             apart_m=self._waiting.apart_m,
@@ -169,7 +177,7 @@ class DeploymentPlanner:
         names = [relay.robot for relay in relays if relay.robot in robots]
         new = self._proposer.chains(agent, robots, names, obstacles)
         chosen = self._best(standing, new or [self._proposer.outward(now, robots, obstacles)], agent, robots)
-        return self._complete(chosen, agent.center, robots, needed, previous, obstacles)
+        return self._complete(chosen, agent, robots, needed, previous, obstacles)
 
     def _unreachable(self, point: Point) -> str:
         """Why no chain leads there; a sentence."""
@@ -209,7 +217,7 @@ class DeploymentPlanner:
     def _complete(
         self,
         chosen: Proposal,
-        agent: Point,
+        agent: Whereabouts,
         robots: Mapping[str, Point],
         needed: int,
         previous: Plan | None,
@@ -223,7 +231,10 @@ class DeploymentPlanner:
             {} if previous is None else {place.robot: place.position for place in previous.placements if place.spare}
         )
         chain = [self._base, *(relay.position for relay in relays)]
-        waiting = self._waiting.places(self._inside(agent), chain, spares, before, obstacles)
+        waiting = {} if agent.announced else self._pursuit.places(agent, chain, spares, before, obstacles)
+        others = {name: place for name, place in spares.items() if name not in waiting}
+        taken = [*obstacles, *waiting.values()]
+        waiting |= self._waiting.places(self._inside(agent.center), chain, others, before, taken)
         placements = tuple(Placement(robot=name, position=place, spare=True) for name, place in waiting.items())
         return Plan(
             (*relays, *placements), tuple(pairwise(names)), chosen.cost, needed, chosen.complete, chosen.reason,
