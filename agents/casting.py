@@ -23,6 +23,7 @@ from agents.role import Role
 from agents.shared_estimate import SharedEstimate
 from agents.sighted_set import Sight
 from agents.standing_orders import StandingOrders
+from agents.topology import TeamTree
 from agents.tracked_agent import TrackedAgent
 from planning.compiled_map import CompiledMap
 from planning.environment import Environment
@@ -88,7 +89,7 @@ class Casting:
         return role, DiscDriver(entry.start, speed_m_s, room)
 
     def _compose(self, entry: RosterEntry, allegiance: Allegiance, incarnation: int, now_s: float) -> Mind:
-        """The mind of a peer with a vote: whom it follows, what it knows, its body, and leading. In this order."""
+        """The mind of a peer with a vote: whom it follows, what it knows, body, tree, leading. In this order."""
         mission = self._mission
         orders, collection = StandingOrders(allegiance), Collection(allegiance, mission.tracked_agent.name)
         body: Robot | BaseStation
@@ -96,12 +97,14 @@ class Casting:
             robot = body = Robot(mission, entry.name, self._judge, allegiance, orders, now_s)
         else:
             robot, body = None, BaseStation(mission, self._environment, orders, collection, now_s)
-        leadership = Leadership(mission, allegiance, orders, collection, _Planner(self.team_planner), robot, now_s)
+        tree = TeamTree(mission, self._environment, allegiance, orders, collection, robot)
+        planner = _Planner(self.team_planner)
+        leadership = Leadership(mission, allegiance, tree, orders, collection, planner, robot, now_s)
         knowing: list[Part] = [allegiance, orders, collection]
         if not mission.announces:
             estimate = SharedEstimate(mission, entry.name, incarnation, self._sight)
             knowing += [estimate, Ranging(mission, entry.name, estimate)]
-        return Mind([*knowing, body, leadership])
+        return Mind([*knowing, body, tree, leadership])
 
     @cached_property
     def _sight(self) -> Sight:

@@ -83,6 +83,7 @@ class Dispatcher:
         """Whether there is more to order than was ordered last."""
         self._due = False
         """Whether more may be released than was when that was looked at last."""
+        self._permitted = True
 
     @property
     def motion(self) -> Motion | None:
@@ -149,8 +150,15 @@ class Dispatcher:
             return ()
         return tuple(robot for robot, state in self._states.items() if not has_heard(state, held))
 
+    def permit(self, permitted: bool) -> None:
+        """Say whether more of the motion may be released: not before the tree that it leads to is in force."""
+        self._due = self._due or permitted
+        self._permitted = permitted
+
     def release(self) -> None:
         """Let the robots go on as far as is due."""
+        if not self._permitted:
+            return
         if self._authority is not None and self._due and self._authority.release(HORIZON_S):
             self.news = True
         self._due = False

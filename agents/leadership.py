@@ -20,6 +20,7 @@ from agents.planning_job import Answer, Question
 from agents.reign_duty import GRACE_S, Body, ReignDuty
 from agents.role import Compute, Effect, Event, JobDone
 from agents.standing_orders import StandingOrders
+from agents.topology import TeamTree
 
 PREPARING: Final = "preparing to plan"
 PLANNING: Final = "planning"
@@ -42,6 +43,7 @@ class Leadership:
     Args:
         mission: roster, rates and periods.
         allegiance: says whether this peer is in office.
+        tree: negotiates the team's tree.
         orders: takes the peer's own orders.
         collection: what is known of the others.
         planner: decides on deployments and motions.
@@ -55,13 +57,14 @@ class Leadership:
         self,
         mission: Mission,
         allegiance: Allegiance,
+        tree: TeamTree,
         orders: StandingOrders,
         collection: Collection,
         planner: Planner,
         body: Body | None,
         now_s: float,
     ) -> None:
-        self._mission, self._allegiance, self._orders = mission, allegiance, orders
+        self._mission, self._allegiance, self._tree, self._orders = mission, allegiance, tree, orders
         self._collection, self._planner, self._body = collection, planner, body
         self._complete_by_s = now_s + GRACE_S
         self._prepared = False
@@ -87,7 +90,7 @@ class Leadership:
             self._duty = None
         elif self._duty is None or self._duty.reign != reign:
             self._duty = ReignDuty(
-                self._mission, reign, self._allegiance, self._orders, self._collection, self._body,
+                self._mission, reign, self._allegiance, self._tree, self._orders, self._collection, self._body,
                 now_s=now_s, complete_by_s=self._complete_by_s,
             )  # fmt: skip
         duty = self._duty

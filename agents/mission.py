@@ -10,7 +10,7 @@ from typing import Literal, TypeAlias
 
 import msgspec
 
-from protocol.messages import Name, Point, RoleName
+from protocol.messages import Method, Name, Point, RoleName
 from protocol.roster import Roster
 
 
@@ -93,6 +93,8 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     """Of the grid of points; None: one that suits the map."""
     search: Literal["chain", "exact", "one-edge", "fixed"] = "chain"
     """How the leader finds chains (:mod:`agents.proposals`)."""
+    topology: Method = "optimum"
+    """Where the trees come from that the leader proposes (:mod:`agents.topology`)."""
     announces: bool = True
     """Whether the agent says where it is and where it goes; else it answers ranging, and nothing more."""
     ranging: Ranging = Ranging()

@@ -3,11 +3,15 @@
 A *decision* is a choice of links and relay places. While one stands it is repeated, with a rising authority sequence,
 the spares' places brought up to date, and as much of the motion released as is due (:mod:`agents.dispatcher`); the
 decision's number rises only when links or relay places change, and goes on from that of the leader before.
+
+A plan with another tree is no decision yet: its tree is negotiated (:mod:`agents.topology`) while the robots judge the
+motion to it, of which nothing is released before the tree is in force. Until then nothing else is planned.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Literal, Protocol
 
 from msgspec import structs
@@ -22,8 +26,9 @@ from agents.records import Advance, Decision, LogLine, Ordered, Planned
 from agents.rhythm import EARLY_S, Rhythm
 from agents.role import Effect, JobDone, Publish, Record
 from agents.standing_orders import StandingOrders
+from agents.topology import TeamTree
 from protocol.membership import Presence
-from protocol.messages import Authority, Reign, State
+from protocol.messages import Authority, Motion, Reign, State
 
 if TYPE_CHECKING:
     from agents.leader import Plan
@@ -49,6 +54,16 @@ class Body(Protocol):
         """What this robot says of itself."""
 
 
+@dataclass(frozen=True, slots=True)
+class _Pending:
+    """A plan whose tree is being negotiated."""
+
+    plan: Plan
+    planning_s: float
+    revision: tuple[int, int] | None
+    """Plan and revision of the motion that leads there."""
+
+
 class ReignDuty:
     """See the module.
 
@@ -56,6 +71,7 @@ class ReignDuty:
         mission: roster, rates and periods.
         reign: the office.
         allegiance: gives warrants.
+        tree: negotiates the team's tree.
         orders: takes the peer's own orders; what was taken last says where the team stands.
         collection: what is known of the others.
         body: the leader's own, if it is a robot.
@@ -68,6 +84,7 @@ class ReignDuty:
         mission: Mission,
         reign: Reign,
         allegiance: Allegiance,
+        tree: TeamTree,
         orders: StandingOrders,
         collection: Collection,
         body: Body | None,
@@ -77,7 +94,7 @@ class ReignDuty:
     ) -> None:
         self.reign = reign
         self._mission, self._allegiance, self._standing, self._body = mission, allegiance, orders, body
-        self._collection = collection
+        self._collection, self._tree = collection, tree
         self._complete_by_s = complete_by_s
         self._agent = mission.tracked_agent.name
         self._robots = tuple(robot.name for robot in mission.robots)
@@ -89,6 +106,8 @@ class ReignDuty:
         self._orders = structs.replace(told, authority=self._authority, motion=None)
         """What was said last."""
         self._plan: Plan | None = plan_of(told, self._agent)
+        self._pending: _Pending | None = None
+        """The plan whose tree is being negotiated."""
         self._heard: dict[str, State] = {}
         self._deaf: dict[str, Authority] = {}
         """Robots that do not hear the leader, and when they were given up."""
@@ -111,6 +130,7 @@ class ReignDuty:
     def lead(self, now_s: float) -> None:
         """Learn what is new, and say what is due."""
         self._follow(now_s)
+        self._settle(now_s)
         self._heed(now_s)
         if now_s >= self._say_at_s - EARLY_S:
             self._say(now_s)
@@ -170,7 +190,7 @@ class ReignDuty:
         """
         due = self._replanning.due(now_s) or self._urgent
         intent = self._collection.intent()
-        if not due or busy or intent is None or not self._is_complete(now_s):
+        if not due or busy or self._pending is not None or intent is None or not self._is_complete(now_s):
             return None
         onset = self._dispatcher.onset()
         self._urgent = onset is None
@@ -199,11 +219,56 @@ class ReignDuty:
         if not done.failure:
             answer: Answer = done.result
             self._effects.append(Record(Planned(planning_s=done.duration_s, in_sight_s=answer.in_sight_s)))
-            self._decide(answer.plan, done.duration_s)
             self._complain("error", "no motion to the deployment: ", answer.failure)
-            if answer.course is not None and self._dispatcher.take(answer.course):
-                self._complain("warning", "the motion is less than wished: ", answer.course.reason)
+            if self._tree.is_in_force(answer.plan.edges):
+                self._decide(answer.plan, done.duration_s)
+                self._go(answer)
+                self._dispatcher.permit(True)
+            elif not answer.failure and self._tree.may_propose(now_s, urgent=not self._serves(now_s)):
+                self._propose(answer, done.duration_s, now_s)
         self._heed(now_s)
+
+    def _go(self, answer: Answer) -> bool:
+        """Order the motion of an answer; whether there is one under way now that leads where the answer does."""
+        course = answer.course
+        if course is None:
+            return True
+        if self._dispatcher.take(course):
+            self._complain("warning", "the motion is less than wished: ", course.reason)
+        motion = self._dispatcher.motion
+        return motion is not None and motion.plan == course.motion.plan
+
+    def _serves(self, now_s: float) -> bool:
+        """Whether the tree in force still does for where the agent may be, with the robots that are there."""
+        placements = () if self._plan is None else self._plan.placements
+        goals = {placement.robot: placement.position for placement in placements}
+        places = {robot: goals.get(robot, state.position) for robot, state in self._heard.items()}
+        base = self._mission.base_station
+        return self._tree.serves({base.name: base.start, **places}, now_s)
+
+    def _propose(self, answer: Answer, planning_s: float, now_s: float) -> None:
+        """Have another tree negotiated, and keep everybody from going where it is needed until it is in force."""
+        if not self._go(answer):
+            return
+        self._dispatcher.permit(False)
+        plan, motion = answer.plan, self._dispatcher.motion
+        self._pending = _Pending(plan, planning_s, _revision(motion))
+        self._effects += self._tree.propose(plan.edges, motion, self._mission.topology, plan.reason, now_s)
+
+    def _settle(self, now_s: float) -> None:
+        """See what has become of the tree that is being negotiated."""
+        pending = self._pending
+        if pending is None:
+            return
+        if self._tree.is_in_force(pending.plan.edges):
+            self._decide(pending.plan, pending.planning_s)
+            self._dispatcher.permit(True)
+        elif self._tree.busy and pending.revision == _revision(self._dispatcher.motion):
+            return
+        else:
+            self._effects += self._tree.withdraw("the motion to it has ended", now_s)
+            self._urgent = True
+        self._pending = None
 
     def _decide(self, plan: Plan, planning_s: float) -> None:
         """Take a deployment over, and say so soon unless it is the same as before."""
@@ -233,6 +298,7 @@ class ReignDuty:
         orders = structs.replace(self._orders, authority=authority, warrant=warrant, motion=motion)
         if self._standing.give(orders, now_s):
             return
+        self._effects += self._tree.look(now_s)
         self._authority, self._orders = authority, orders
         if dispatcher.said(authority, now_s) and motion is not None:
             self._effects.append(Record(Ordered(epoch=self.reign.epoch, motion=motion)))
@@ -251,3 +317,7 @@ class ReignDuty:
 
     def _log(self, level: Literal["info", "warning", "error"], text: str) -> None:
         self._effects.append(Record(LogLine(level=level, text=text)))
+
+
+def _revision(motion: Motion | None) -> tuple[int, int] | None:
+    return None if motion is None else (motion.plan, motion.revision)

@@ -10,7 +10,7 @@ Whoever leads asks :meth:`TeamTree.is_in_force` before it lets robots go where a
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, Literal, Protocol
 
@@ -148,20 +148,19 @@ class TeamTree:
         """Whether another tree can be proposed now; ``urgent``: the one in force does not serve any more."""
         return not self.busy and self._negotiation.may_propose(now_s, urgent)
 
-    def serves(self, present: Collection[str], last_relay: Point, now_s: float) -> bool:
-        """Whether the tree in force still does: its members are there, and its last relay sees where the agent may be.
+    def serves(self, places: Mapping[str, Point], now_s: float) -> bool:
+        """Whether the tree in force still does: its members are there, and it reaches to where the agent may be.
 
         Args:
-            present: base station and robots that are there.
-            last_relay: where the last relay of the tree is going, or the base station is.
+            places: base station and robots that are there, and where they are or go.
             now_s: the time.
         """
         tree = self._negotiation.committed
-        if tree is None or self._agent not in tree.members:
+        if tree is None or self._agent not in tree.members or set(tree.members) - {self._agent} - places.keys():
             return False
-        scene = Scene(self._environment, None, {self._name: last_relay}, self._agent, self._agent_places(now_s))
-        sees = stages_in_sight(scene, [(self._name, self._agent)]) == [0]
-        return sees and all(member in present for member in tree.members if member != self._agent)
+        links = [edge for edge in tree.edges if self._agent in edge]
+        scene = Scene(self._environment, None, places, self._agent, self._agent_places(now_s))
+        return None not in stages_in_sight(scene, links)
 
     def propose(
         self, edges: Collection[Edge], motion: Motion | None, method: Method, reason: str, now_s: float
