@@ -11,6 +11,7 @@ entity                  what is there
 ``world/sight``         all lines of sight between peers
 ``world/chain/...``     links of the current deployment tree: ``in_sight``, ``broken``
 ``world/motion/...``    the team's motion: ``ways`` with the ends of their ``stages``, ``released`` ones again
+``world/estimate/...``  ``<peer>/outline`` of where the agent may be; the base station's ``area`` and ``center``
 ``world/peers/...``     ``<peer>/body`` (dot, true disc, velocity), ``/trail``, ``/path``, ``/target``
 ``tree``                the deployment tree as a graph, in columns by hops from the base station
 ``connected``           agent visible, chain connected, team connected: 0 or 1 each
@@ -20,6 +21,8 @@ entity                  what is there
 ``certified``           what the motion keeps joined: nothing, the chain, the team, the team and the agent (0 to 3)
 ``in_hand``             of each robot, how many stages are released and not finished
 ``in_sight_s``          how long the last relay will see the agent wherever it goes
+``estimate_area/...``   of each peer's estimate, square metres
+``estimate_age/...``    of the newest range in it, seconds
 ``mode/<peer>``         what the peer's body does
 ``log/<peer>``          log lines, and the leader's decisions with their reasons
 ======================  ==============================================================================
@@ -52,6 +55,7 @@ from agents.recorder_columns import (
     places_columns,
     scalar_columns,
 )
+from agents.recorder_estimate import draw_estimate, style_estimates
 from agents.recorder_file import RecordingFile
 from agents.recorder_layout import lay_out_views
 from agents.recorder_style import CELL, ROLE_COLOURS, UNKNOWN, WALL, faded, style
@@ -60,6 +64,7 @@ from agents.records import (
     AnyRecord,
     Connectivity,
     Decision,
+    Estimate,
     LogLine,
     Mishap,
     Ordered,
@@ -159,6 +164,8 @@ class RerunRecorder:
         """Say how the recording opens, once; called by one process of the team, after :meth:`log_map`."""
         self.know(mission)
         style(self._file, mission)
+        if not mission.announces:
+            style_estimates(self._file, mission)
         self._file.open_with(lay_out_views(mission, self._bounds))
 
     def know(self, mission: Mission) -> None:
@@ -189,6 +196,9 @@ class RerunRecorder:
                 self._gather(now_ns, "in_sight_s", scalar_columns, [record.in_sight_s])
             case Mishap():
                 self._log(f"log/{peer}", rr.TextLog(record.text, level=rr.TextLogLevel.WARN))
+            case Estimate():
+                first = self._roles.get(peer) == "base_station"
+                draw_estimate(self._file, now_ns, peer, record, base_station=first)
             case LogLine():
                 self._log(f"log/{peer}", rr.TextLog(f"{peer}: {record.text}", level=_LEVELS[record.level]))
         self._file.flush(now=isinstance(record, Decision | LogLine | Mishap))

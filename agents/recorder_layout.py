@@ -24,6 +24,15 @@ CURVES: Final = (
 )
 """Entity and title."""
 
+AREA: Final = "estimate_area"
+AGE: Final = "estimate_age"
+
+ESTIMATE_CURVES: Final = (
+    (AREA, "Estimate of the agent [m²]"),
+    (AGE, "Its newest range [s]"),
+)
+"""Of an agent that does not announce."""
+
 
 def lay_out_views(mission: Mission, bounds: tuple[float, float, float, float] | None) -> rrb.Blueprint:
     """Map and log on the left; tree, modes and curves on the right."""
@@ -49,7 +58,7 @@ def lay_out_views(mission: Mission, bounds: tuple[float, float, float, float] | 
     )
     curves = [
         rrb.TimeSeriesView(origin=f"/{entity}", name=name, plot_legend=rrb.PlotLegend(visible=False))
-        for entity, name in CURVES
+        for entity, name in (CURVES if mission.announces else (*CURVES, *ESTIMATE_CURVES))
     ]
     return rrb.Blueprint(
         rrb.Horizontal(
