@@ -1,0 +1,165 @@
+"""Missions in which much goes wrong, drawn from a seed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from random import Random
+from typing import Final, Literal
+
+from agents.mission import Mission, RosterEntry, Scripted
+from launcher.fault_timetable import (
+    LEADER,
+    Clock,
+    Corrupt,
+    Cut,
+    Delay,
+    Disk,
+    Duplicate,
+    Fault,
+    Kill,
+    Loss,
+    Partition,
+    Pause,
+    Timetable,
+)
+from protocol.ballot import CLOCK_DRIFT
+from tests.faults.light_team import DEPTH_M, RADIUS_M, WIDTH_M, lane
+
+QUIET_S: Final = 8.0
+"""At the end of each mission nothing goes wrong any more, for so long."""
+
+LONGEST_FAULT_S: Final = 6.0
+
+
+@dataclass(frozen=True)
+class ChaosCase:
+    """A mission and what goes wrong in it; the same case has the same history, to the last bit."""
+
+    seed: int
+    robots: int
+    duration_s: float
+    faults: tuple[Fault, ...]
+
+    @property
+    def timetable(self) -> Timetable:
+        """What goes wrong."""
+        return Timetable(faults=self.faults)
+
+    def mission(self) -> Mission:
+        """What all peers know."""
+        chance = Random(f"{self.seed}/mission")
+        goals = tuple(
+            (round(chance.uniform(2.0, WIDTH_M - 1.0), 2), DEPTH_M - 1.0) for _ in range(int(self.duration_s / 8.0) + 1)
+        )
+        return Mission(
+            team="team",
+            map_path="",
+            roster=(
+                RosterEntry(name="base", role="base_station", start=(1.0, DEPTH_M / 2 + 4.5)),
+                RosterEntry(name="agent", role="tracked_agent", start=(3.0, DEPTH_M - 1.0)),
+                *(
+                    RosterEntry(name=name, role="robot", start=lane(n))
+                    for n, name in enumerate(robot_names(self.robots))
+                ),
+            ),
+            behaviour=Scripted(goals=goals, pause_s=1.0, start_after_s=2.0),
+            robot_radius_m=RADIUS_M,
+            agent_radius_m=RADIUS_M,
+            robot_speed_m_s=1.2,
+            agent_speed_m_s=0.8,
+            control_hz=2.0,
+            heartbeat_hz=1.0,
+            planning_period_s=1.0,
+            decomposition="inflection",
+            duration_s=self.duration_s,
+            seed=self.seed,
+            epoch_unix_s=0.0,
+            planning_delay_s=round(chance.choice((0.0, 0.02, 0.1, 0.3)), 3),
+        )
+
+
+def robot_names(count: int) -> tuple[str, ...]:
+    """Of a team with so many robots."""
+    return tuple(f"robot{number}" for number in range(1, count + 1))
+
+
+def draw_case(seed: int) -> ChaosCase:
+    """A team of 5 to 9 peers, 30 to 60 s, and faults of all kinds, most of them one after the other."""
+    chance = Random(f"{seed}/case")
+    robots = chance.randint(3, 7)
+    duration_s = float(chance.randint(30, 60))
+    voters = ("base", *robot_names(robots))
+    faults: list[Fault] = []
+    if chance.random() < 0.5:
+        faults += draw_clocks(chance, voters)
+    begins_s = 0.0
+    while True:
+        begins_s += chance.expovariate(1.0 / chance.choice((0.3, 2.5)))
+        for_s = _round(min(chance.expovariate(0.5) + 0.05, LONGEST_FAULT_S, duration_s - QUIET_S - begins_s))
+        if for_s < 0.05:
+            break
+        faults.append(draw_fault(chance, voters, _round(begins_s), for_s))
+    if chance.random() < 0.1:
+        faults.append(Kill(at_s=_round(chance.uniform(3.0, duration_s - QUIET_S)), who=chance.choice(voters)))
+    return ChaosCase(seed, robots, duration_s, tuple(sorted(faults, key=lambda fault: fault.at_s)))
+
+
+def draw_clocks(chance: Random, voters: Sequence[str]) -> list[Fault]:
+    """Clocks of other zeros, and of rates up to the limits that the election allows."""
+    rates = (1.0 - CLOCK_DRIFT, 1.0, 1.0 + CLOCK_DRIFT)
+    return [
+        Clock(at_s=0.0, who=name, rate=chance.choice(rates), offset_s=_round(chance.uniform(-50.0, 50.0)))
+        for name in voters
+    ]
+
+
+def draw_fault(chance: Random, voters: Sequence[str], at_s: float, for_s: float) -> Fault:
+    """One fault of any kind."""
+    who = LEADER if chance.random() < 0.4 else chance.choice((*voters, "agent"))
+    some = tuple(chance.sample(voters, chance.randint(1, len(voters) - 1)))
+    speakers = () if chance.random() < 0.3 else some
+    hearers = () if chance.random() < 0.3 else tuple(chance.sample(voters, chance.randint(1, len(voters) - 1)))
+    share = _round(chance.choice((0.1, 0.3, 0.6)))
+    match chance.choices(_KINDS, _WEIGHTS)[0]:
+        case "kill":
+            disk: Literal["kept", "lost"] = "lost" if chance.random() < 0.15 else "kept"
+            late_s = chance.choice((0.0, 0.0, 1.0, 3600.0))
+            return Kill(at_s=at_s, for_s=for_s, who=who, disk=disk, noticed_after_s=late_s)
+        case "pause":
+            return Pause(at_s=at_s, for_s=for_s, who=who, speaking=chance.random() < 0.5)
+        case "partition":
+            return Partition(at_s=at_s, for_s=for_s, group=some, noticed_after_s=chance.choice((0.0, 1.0, 3600.0)))
+        case "cut":
+            return Cut(at_s=at_s, for_s=for_s, speakers=some, hearers=hearers)
+        case "loss":
+            burst = chance.choice((1.0, 1.0, 5.0, 20.0))
+            return Loss(at_s=at_s, for_s=for_s, speakers=speakers, hearers=hearers, share=share, burst=burst)
+        case "delay":
+            tails: tuple[Literal["uniform", "exponential", "log-normal"], ...] = (
+                "uniform",
+                "exponential",
+                "log-normal",
+            )
+            mean_s = chance.choice((0.01, 0.1, 0.5, 1.5))
+            spikes, spike_s = chance.choice(((0.0, 0.0), (0.05, 1.0), (0.2, 3.0)))
+            return Delay(
+                at_s=at_s, for_s=for_s, speakers=speakers, hearers=hearers, mean_s=mean_s, tail=chance.choice(tails),
+                spikes=spikes, spike_s=spike_s, overtaking=chance.random() < 0.5,
+            )  # fmt: skip
+        case "duplicate":
+            return Duplicate(at_s=at_s, for_s=for_s, speakers=speakers, hearers=hearers, share=share)
+        case "corrupt":
+            return Corrupt(at_s=at_s, for_s=for_s, speakers=speakers, hearers=hearers, share=share)
+    if chance.random() < 0.3:
+        return Disk(at_s=at_s, for_s=for_s, who=who, full=True)
+    return Disk(at_s=at_s, for_s=for_s, who=who, takes_s=chance.choice((0.05, 0.3, 1.5)))
+
+
+_KINDS: Final = ("kill", "pause", "partition", "cut", "loss", "delay", "duplicate", "corrupt", "disk")
+_WEIGHTS: Final = (6, 6, 4, 3, 3, 3, 1, 1, 3)
+
+
+def _round(number: float) -> float:
+    """To milliseconds, so that timetables can be read."""
+    return round(number, 3)
