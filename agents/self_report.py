@@ -34,9 +34,7 @@ class SelfReport:
         """When something is due next."""
         return min(self._control.next_s, self._heartbeat.next_s)
 
-    def due(
-        self, now_s: float, body: State | Intent, *, urgent: bool = False, silent: bool = False
-    ) -> list[Effect]:
+    def due(self, now_s: float, body: State | Intent, *, urgent: bool = False, silent: bool = False) -> list[Effect]:
         """What is to be said and recorded now.
 
         Args:
