@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.mission import Mission
-from agents.records import AnyRecord, Decision, LogLine, Ordered, Planned, Track
+from agents.records import AnyRecord, Decision, Estimate, LogLine, Ordered, Planned, Track
 from protocol.messages import RoleName
 
 Floats = NDArray[np.float64]
@@ -40,6 +40,8 @@ class MissionTrace:
     planned: tuple[Planned, ...]
     """All planning jobs."""
     motions: tuple[tuple[float, Ordered], ...]
+    estimates: tuple[tuple[float, str, Estimate], ...]
+    """Where which peer took an independent agent to be."""
     logs: tuple[tuple[float, str, LogLine], ...]
     agent: str
     """Name of the tracked agent."""
@@ -75,6 +77,7 @@ class MissionTrace:
             decisions=tuple((time_s, record) for time_s, _, record in ordered if isinstance(record, Decision)),
             planned=tuple(record for _, _, record in ordered if isinstance(record, Planned)),
             motions=tuple((time_s, record) for time_s, _, record in ordered if isinstance(record, Ordered)),
+            estimates=tuple((time_s, peer, record) for time_s, peer, record in ordered if isinstance(record, Estimate)),
             logs=tuple((time_s, peer, record) for time_s, peer, record in ordered if isinstance(record, LogLine)),
             agent=mission.tracked_agent.name,
             control_hz=mission.control_hz,

@@ -17,6 +17,7 @@ from agents.motion_level import AGENT, CHAIN, TEAM, certified_level
 from agents.self_report import silence_s
 from launcher.contacts import Overlap, find_overlaps
 from launcher.mission_trace import MissionTrace, Trail
+from launcher.report_estimate import EstimateFigures, failures_of, measure_estimates
 from launcher.wording import counted
 from planning.environment import Environment
 
@@ -100,6 +101,8 @@ class Metrics(msgspec.Struct, frozen=True, kw_only=True):
     """Of robots: none, if all is well."""
     agent_contacts: tuple[Overlap, ...]
     """Of robots and the agent, which goes where it likes."""
+    estimate: EstimateFigures | None
+    """Of an agent that does not announce."""
     failures: tuple[str, ...]
     """What must not happen, and did; sentences."""
     warnings: int
@@ -131,6 +134,7 @@ def measure(trace: MissionTrace, environment: Environment) -> Metrics:
     robots = [trail.peer for trail in trace.trails if trail.role == "robot"]
     contacts = tuple(find_overlaps(trace.trails, places, there, middles_s, lengths_s))
     overlaps = tuple(contact for contact in contacts if set(contact.peers) <= set(robots))
+    estimate = measure_estimates(trace)
     return Metrics(
         duration_s=trace.duration_s,
         first_deployment_s=first_s,
@@ -161,10 +165,14 @@ def measure(trace: MissionTrace, environment: Environment) -> Metrics:
         agent_certain=_agent_certain(trace),
         overlaps=overlaps,
         agent_contacts=tuple(contact for contact in contacts if contact not in overlaps),
-        failures=tuple(
-            f"{' and '.join(overlap.peers)} overlapped {counted(overlap.episodes, 'time')}, "
-            f"{overlap.seconds:.1f} s in all"
-            for overlap in overlaps
+        estimate=estimate,
+        failures=(
+            *(
+                f"{' and '.join(overlap.peers)} overlapped {counted(overlap.episodes, 'time')}, "
+                f"{overlap.seconds:.1f} s in all"
+                for overlap in overlaps
+            ),
+            *failures_of(estimate),
         ),
         warnings=sum(line.level == "warning" for _, _, line in trace.logs),
         errors=sum(line.level == "error" for _, _, line in trace.logs),

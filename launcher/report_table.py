@@ -7,6 +7,7 @@ from rich.table import Table
 
 from launcher.contacts import Overlap
 from launcher.report import Metrics, Shares
+from launcher.report_estimate import EstimateFigures
 from launcher.wording import counted
 
 
@@ -47,6 +48,7 @@ def render(metrics: Metrics) -> Group:
         ),
         ("decisions", f"{metrics.decisions}, {len(metrics.topology_changes)} of them changed the topology"),
         ("motion", _describe_motion(metrics)),
+        *_describe_estimate(metrics.estimate),
         ("overlapping robots", _describe_contacts(metrics.overlaps)),
         ("robots at the agent", _describe_contacts(metrics.agent_contacts) + ", as it goes where it likes"),
         ("log", f"{metrics.warnings} warnings, {metrics.errors} errors, in the recording and in logs/"),
@@ -71,6 +73,27 @@ def _describe_motion(metrics: Metrics) -> str:
         f"{plans}; certified as one network {100 * certified.team:.1f} % of the time, with the agent's next moments "
         f"{100 * certified.agent:.1f} %"
     )
+
+
+def _describe_estimate(figures: EstimateFigures | None) -> list[tuple[str, str]]:
+    """Rows about the estimate; none where the agent announces."""
+    if figures is None:
+        return []
+    equal = "" if figures.equal is None else f"; all peers' equal {100.0 * figures.equal:.1f} % of the time"
+    return [
+        (
+            "estimate of the agent",
+            f"{figures.error_median_m:.2f} m off in the median, 95 % within {figures.error_p95_m:.2f} m; "
+            f"{figures.area_median_m2:.1f} m² in the median, 95 % within {figures.area_p95_m2:.1f} m²; "
+            f"95 % no older than {figures.age_p95_s:.1f} s",
+        ),
+        ("agent inside it", f"{100.0 * figures.contained:.1f} % of {figures.records} sets of all peers{equal}"),
+        (
+            "ranges",
+            f"{figures.ranges} measured, a peer lacks {100.0 * figures.unshared:.1f} % at the end; "
+            f"{figures.late} came too late",
+        ),
+    ]
 
 
 def _describe_contacts(contacts: tuple[Overlap, ...]) -> str:
