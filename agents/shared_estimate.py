@@ -36,7 +36,10 @@ from protocol.messages import Point, RangeBase, RangeDigest, Ranges
 from protocol.shared_estimate import BASE, Debts
 
 DIGEST_S: Final = 1.0
-"""Time between two digests, and how often each peer records its set."""
+"""Time between two digests."""
+
+RECORD_S: Final = 0.5
+"""Each peer records its set so often; all at the same moments, so that they can be compared."""
 
 FLIGHT_S: Final = 0.3
 """Ranges younger than this when somebody said which it has may have been on their way to it."""
@@ -86,6 +89,7 @@ class SharedEstimate:
         self._debts = Debts(others, f"{mission.seed}/{name}/{incarnation}/turns")
         share = voters.index(name) / len(voters)
         self._digest = Rhythm(DIGEST_S, DIGEST_S * (share - 1.0))
+        self._recording = Rhythm(RECORD_S, 0.0)
         self._own: deque[TimedRange] = deque(maxlen=REPEATED)
         self._newest_s = -math.inf
         self._said_s = -math.inf
@@ -95,8 +99,8 @@ class SharedEstimate:
 
     @property
     def next_s(self) -> float:
-        """When a digest or an answer is due."""
-        return min(self._digest.next_s, self._debts.next_s)
+        """When a digest, an answer or a record is due."""
+        return min(self._digest.next_s, self._debts.next_s, self._recording.next_s)
 
     def handle(self, event: Event, now_s: float) -> Iterator[Effect]:
         """Take in what others say; answer and say what is due."""
@@ -105,6 +109,8 @@ class SharedEstimate:
                 if self._digest.due(now_s):
                     yield from self._sum_up(now_s)
                 yield from self._answer(now_s)
+                if self._recording.due(now_s) and (target := self.target(now_s)) is not None:
+                    yield Record(self._describe(target, now_s))
             case Heard(address, envelope):
                 match envelope.body:
                     case Ranges():
@@ -163,13 +169,10 @@ class SharedEstimate:
         self._region = None
 
     def _sum_up(self, now_s: float) -> Iterator[Effect]:
-        """Fold, say which ranges there are, and record the set."""
+        """Fold, and say which ranges there are."""
         self._said_s = max(now_s, self._said_s)
         self._ranges.fold(now_s, KEPT_S)
         yield Publish(digest_to_wire(self._ranges.digest(self._said_s)))
-        target = self.target(now_s)
-        if target is not None:
-            yield Record(self._describe(target, now_s))
 
     def _describe(self, target: TargetSet, now_s: float) -> Estimate:
         ranges = self._ranges
