@@ -38,3 +38,6 @@ def exercise() -> None:
     ball = Ellipsoid.ball(np.zeros(3), 1.0)
     fuse(ball, Ellipsoid.ball(np.full(3, 0.5), 1.0))
     cut(ball, Strip(np.array([1.0, 0.0, 0.0]), -0.5, 0.5))
+
+
+PARTS = (exercise,)

@@ -101,7 +101,7 @@ def test_kernels_are_compiled_again_when_a_source_that_they_depend_on_changes(
     (package / "inner.py").write_text("from sampled.kernel import kernel\n")
     (package / "outer.py").write_text("from sampled.kernel import kernel\nfrom sampled.inner import kernel as k\n")
     (package / "warm_up.py").write_text(
-        "def exercise():\n    with open(__file__ + '.log', 'a') as log:\n        log.write('.')\n"
+        "def part():\n    with open(__file__ + '.log', 'a') as log:\n        log.write('.')\n\nPARTS = (part,)\n"
     )
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.setattr(launcher.kernels, "PACKAGES", ("sampled",))
@@ -127,3 +127,19 @@ def test_kernels_are_compiled_again_when_a_source_that_they_depend_on_changes(
     assert compiled_again() == {"inner", "outer"}
     assert len(said) == 4
     assert (package / "warm_up.py.log").read_text() == "...."
+
+
+def test_kernels_that_do_not_compile_are_not_taken_for_compiled(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    package = tmp_path / "broken"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    (package / "warm_up.py").write_text(
+        "def works(): pass\n\ndef fails(): raise TypeError('no such type')\n\nPARTS = (works, fails)\n"
+    )
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(launcher.kernels, "__file__", str(tmp_path / "launcher" / "kernels.py"))
+    for _ in range(2):
+        with pytest.raises(launcher.kernels.CompilationFailed, match=r"kernels of broken .*(?s:.)*no such type"):
+            launcher.kernels.warm_up(packages=["broken"])
