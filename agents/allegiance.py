@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final, Literal
 
+from msgspec import structs
+
 from agents.records import LogLine, Office
 from agents.role import Effect, Event, Heard, Publish, Record, Written
 from protocol import core
@@ -59,7 +61,7 @@ class Allegiance:
         )
         self.membership = Membership(roster, name, heartbeat_s)
         self._election_s = self._membership_s = now_s
-        self._office = Office(standing="", leads=None, obeys=None)
+        self._office = Office(incarnation=incarnation, standing="", leads=None, obeys=None)
         """What was recorded last."""
         self._effects: list[Effect] = []
 
@@ -172,16 +174,15 @@ class Allegiance:
     def _note_office(self, lease_until_s: float, obeyed_until_s: float, now_s: float) -> None:
         """Record who leads and who is obeyed, if that is new. What ended while this peer hung ended in its time."""
         before = self._office
-        office = Office(standing=self.election.standing.value, leads=self.reign, obeys=self.obeyed(now_s))
+        standing = self.election.standing.value
+        office = structs.replace(before, standing=standing, leads=self.reign, obeys=self.obeyed(now_s))
         if office == before:
             return
         self._office = office
         self._effects.append(
             Record(
-                Office(
-                    standing=office.standing,
-                    leads=office.leads,
-                    obeys=office.obeys,
+                structs.replace(
+                    office,
                     led_until_s=min(now_s, lease_until_s) if before.leads not in (None, office.leads) else None,
                     obeyed_until_s=min(now_s, obeyed_until_s) if before.obeys not in (None, office.obeys) else None,
                 )

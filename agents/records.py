@@ -113,6 +113,8 @@ class Connectivity(msgspec.Struct, frozen=True, kw_only=True, tag_field="record"
 class Office(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag="office"):
     """Who leads and who is obeyed, as the recording peer believes; with every change."""
 
+    incarnation: int
+    """Of this process. One that is killed says nothing more, so that all of this ends with what it recorded last."""
     standing: str
     """Where it stands in the election (:class:`protocol.election_states.Standing`)."""
     leads: Reign | None
