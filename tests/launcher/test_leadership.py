@@ -1,9 +1,10 @@
-"""The leader dies, hangs, is cut off and comes back, in virtual time, with complete minds and a planner that is quick."""
+"""The leader dies, hangs, is cut off and comes back, in virtual time, with complete minds and a quick planner."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import combinations, pairwise
+from typing import TypeVar
 
 import pytest
 from msgspec import structs
@@ -18,6 +19,8 @@ from tests.faults.light_team import DEPTH_M, RADIUS_M, LightCasting, lane
 
 ROBOTS = tuple(f"robot{number}" for number in range(1, 5))
 TEAM = ("base", *ROBOTS)
+
+Kind = TypeVar("Kind", bound=AnyRecord)
 
 
 def mission() -> Mission:
@@ -90,37 +93,32 @@ class Play:
                     end_s = following[0] if ended_s is None else ended_s
                 yield name, reign, begin_s, end_s
 
-    def of(self, kind: type) -> list[tuple[float, str, AnyRecord]]:
+    def of(self, kind: type[Kind]) -> list[tuple[float, str, Kind]]:
         """Records of one kind."""
-        return [entry for entry in self.records if isinstance(entry[2], kind)]
+        return [(time_s, peer, record) for time_s, peer, record in self.records if isinstance(record, kind)]
 
     def leaders(self) -> list[tuple[float, str]]:
         """Who took office when."""
-        return [
-            (time_s, peer)
-            for time_s, peer, record in self.of(LogLine)
-            if record.text.startswith("leads in epoch")  # type: ignore[union-attr]
-        ]
+        return [(time_s, peer) for time_s, peer, record in self.of(LogLine) if record.text.startswith("leads in epoch")]
 
     def plans(self) -> list[tuple[float, str, int, int]]:
         """When a plan was ordered first, by whom, in which epoch, and its number."""
-        seen = {}
+        seen: dict[tuple[str, int, int], float] = {}
         for time_s, peer, ordered in self.of(Ordered):
-            assert isinstance(ordered, Ordered)
             seen.setdefault((peer, ordered.epoch, ordered.motion.plan), time_s)
         return [(time_s, *what) for what, time_s in seen.items()]
 
     def decisions(self) -> list[int]:
-        return [record.deployment.decision for _, _, record in self.of(Decision)]  # type: ignore[union-attr]
+        return [record.deployment.decision for _, _, record in self.of(Decision)]
 
     def travelled_m(self, robot: str, begin_s: float, end_s: float) -> float:
         """Along its lane."""
-        places = [r.position[0] for t, peer, r in self.of(Track) if peer == robot and begin_s <= t <= end_s]  # type: ignore[union-attr]
+        places = [r.position[0] for t, peer, r in self.of(Track) if peer == robot and begin_s <= t <= end_s]
         return sum(abs(b - a) for a, b in pairwise(places))
 
     def logs(self, peer: str, word: str) -> list[float]:
         """When a peer has logged a line with this in it."""
-        return [time_s for time_s, who, line in self.of(LogLine) if who == peer and word in line.text]  # type: ignore[union-attr]
+        return [time_s for time_s, who, line in self.of(LogLine) if who == peer and word in line.text]
 
 
 def test_a_team_that_starts_is_led_by_its_base_station_at_once() -> None:
@@ -184,7 +182,7 @@ def test_a_robot_that_starts_late_knows_all_within_seconds_and_takes_part() -> N
     with_it = [
         time_s
         for time_s, _, ordered in play.of(Ordered)
-        if any(way.member == "robot4" and way.scheduled for way in ordered.motion.ways)  # type: ignore[union-attr]
+        if any(way.member == "robot4" and way.scheduled for way in ordered.motion.ways)
     ]
     assert 6.15 < with_it[0] < 6.15 + 2.5
 
@@ -202,7 +200,7 @@ def test_a_robot_that_does_not_hear_the_leader_does_not_keep_the_team_waiting() 
     time_s, leader, _, _ = play.plans()[-1]
     assert (leader, 3.0 < time_s < 10.0) == ("base", True)
     last = play.of(Ordered)[-1][2]
-    assert [way.scheduled for way in last.motion.ways if way.member == "robot2"] == [False]  # type: ignore[union-attr]
+    assert [way.scheduled for way in last.motion.ways if way.member == "robot2"] == [False]
 
 
 @pytest.mark.parametrize("takes_s", [0.05, 0.2])
