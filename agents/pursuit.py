@@ -37,6 +37,9 @@ NEAR_M: Final = (1.2, 2.2)
 DIRECTIONS: Final = 12
 """They go to places so far from the middle of where the agent may be, in so many directions."""
 
+FAR_M: Final = 3.0
+"""Or stay where they are, if that is no farther from it."""
+
 AHEAD_S: Final = 1.0
 """The set is that of so long after the robots can set out."""
 
@@ -122,9 +125,8 @@ class Pursuit:
     ) -> Point | None:
         """The best place for one robot; None if there is none."""
         ring = np.array(center) + self._ring
-        places = np.concatenate([ring[self._geodesics.environment.contains(ring)], [robot]])
-        if before is not None:
-            places = np.concatenate([places, [before]])
+        known = [place for place in (robot, before) if place is not None and math.dist(place, center) < FAR_M]
+        places = np.concatenate([ring[self._geodesics.environment.contains(ring)], np.reshape(known, (-1, 2))])
         gaps = np.hypot(*(places[:, None] - np.reshape(taken, (-1, 2))).transpose(2, 0, 1))
         places = places[gaps.min(axis=1, initial=np.inf) > self._apart_m]
         if len(places) == 0:
