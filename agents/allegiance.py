@@ -119,6 +119,10 @@ class Allegiance:
         """Whether a peer is there."""
         return self.membership.presence(peer)
 
+    def latest_incarnation(self, peer: str) -> int:
+        """Of a peer, as far as is known; -1 before anything is."""
+        return self.membership.incarnation(peer)
+
     def handle(self, event: Event, now_s: float) -> Iterable[Effect]:
         """Pass an event on to election and membership, and do what they want."""
         ended_s = self.election.lease_until_s, self.obeyed_until_s

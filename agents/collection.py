@@ -52,7 +52,7 @@ class Collection:
         known = self._known.get(peer)
         if known is None or self._allegiance.presence(peer) is not Presence.PRESENT:
             return None
-        return known.body if known.incarnation == self._allegiance.membership.incarnation(peer) else None
+        return known.body if known.incarnation == self._allegiance.latest_incarnation(peer) else None
 
     def state(self, robot: str) -> State | None:
         """What a robot or the base station says of itself, as :meth:`body`."""

@@ -280,7 +280,7 @@ class ReignDuty:
         if before is not None and not decides and plan.placements == before.placements:
             return
         self._orders = renew(self._orders, plan, decides=decides)
-        self._say_at_s = -math.inf
+        self._say_at_s = self._said_s + PACE_S
         if decides:
             changed = changes_topology(plan, before)
             self._effects.append(

@@ -19,6 +19,7 @@ class Sworn(Allegiance):
         self._last: Reign | None = None
         self._until_s = float("-inf")
         self._order = (-1, -1)
+        self.gone: set[str] = set()
 
     @property
     def reign(self) -> Reign | None:
@@ -41,8 +42,11 @@ class Sworn(Allegiance):
     def warrant(self, _now_s: float) -> Warrant | None:
         return None if self.office is None else Warrant(lease_s=1.0, marks=())
 
-    def presence(self, _peer: str) -> Presence:
-        return Presence.PRESENT
+    def presence(self, peer: str) -> Presence:
+        return Presence.GONE if peer in self.gone else Presence.PRESENT
+
+    def latest_incarnation(self, _peer: str) -> int:
+        return 0
 
     def take(
         self, _kind: str, authority: Authority, sender: str, incarnation: int, _warrant: Warrant, now_s: float
