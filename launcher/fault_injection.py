@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from itertools import permutations
@@ -62,18 +63,19 @@ class FaultInjection:
         leader: Callable[[], str | None],
         note: Callable[[Mishap], None],
     ) -> None:
-        self.begun = 0
-        """Faults that have."""
         self._time, self._network, self._peers = time, network, peers
         self._leader, self._note = leader, note
         self._active: list[Fault] = []
+        self._to_come = sum(fault.for_s is not None for fault in timetable.faults)
+        """Faults that have an end, and have not come to it."""
+        self._changed_s = 0.0
         for fault in sorted(timetable.faults, key=lambda fault: fault.at_s):
             time.call_at(fault.at_s, self._begin, fault)
 
     @property
-    def is_quiet(self) -> bool:
-        """Whether nothing is amiss now."""
-        return not self._active
+    def quiet_since_s(self) -> float:
+        """Since when nothing more goes wrong, but what lasts for ever; infinite: something will, or does."""
+        return math.inf if self._to_come else self._changed_s
 
     def _begin(self, fault: Fault) -> None:
         if isinstance(fault, PeerFault) and fault.who == LEADER:
@@ -82,7 +84,7 @@ class FaultInjection:
                 self._time.call_at(self._time.now_s + LOOK_S, self._begin, fault)
                 return
             fault = structs.replace(fault, who=name)
-        self.begun += 1
+        self._changed_s = self._time.now_s
         self._active.append(fault)
         self._tell(fault, over=False)
         match fault:
@@ -102,6 +104,8 @@ class FaultInjection:
 
     def _end(self, fault: Fault) -> None:
         self._active = [other for other in self._active if other is not fault]
+        self._to_come -= 1
+        self._changed_s = self._time.now_s
         self._tell(fault, over=True)
         match fault:
             case Kill(who=who):

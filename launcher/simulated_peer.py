@@ -131,12 +131,16 @@ class SimulatedPeer:
         """Of its role, if that has one."""
         self.incarnation = -1
         """Of the latest process."""
+        self.watch = watch
+        """Called after each event that it has handled."""
         self.said: Callable[[SimulatedPeer, str, bytes], None] | None = None
         """Called with key and payload of everything that it says, before anybody hears it."""
         self._time, self._network = time, network
         self._casting, self._mission = casting, mission
-        self._record, self._watch = record, watch
+        self._record = record
         self._body: DiscDriver | None = None
+        self._mover: _TrueBody | None = None
+        self._parts: dict[type[object], object] = {}
         self._due_s = math.inf
         self._waiting: Inbox[JobDone | Written] | None = None
         """What arrives while it is paused; None while it is not."""
@@ -152,6 +156,23 @@ class SimulatedPeer:
     def now_s(self) -> float:
         """What its clock shows."""
         return self.clock.read(self._time.now_s)
+
+    @property
+    def true_s(self) -> float:
+        """True time."""
+        return self._time.now_s
+
+    @property
+    def drives_until_s(self) -> float:
+        """True time at which its body stands if it is told nothing more; it may stand already."""
+        return -math.inf if self._mover is None else self._mover.until_s
+
+    def part(self, kind: type[APart]) -> APart | None:
+        """The part of this kind of its present mind; None if it has none."""
+        if kind not in self._parts:
+            parts = getattr(self.role, "parts", ())
+            self._parts[kind] = next((part for part in parts if isinstance(part, kind)), None)
+        return self._parts[kind]  # type: ignore[return-value]
 
     @property
     def place(self) -> Point:
@@ -176,11 +197,14 @@ class SimulatedPeer:
         )
         role, body = self._casting.cast(self.name, incarnation=self.incarnation, promise=promise, now_s=self.now_s)
         self._body = body = self._body or body
-        self.role, self.allegiance = role, part_of(role, Allegiance)
+        self.role = role
+        self._parts.clear()
+        self.allegiance = self.part(Allegiance)
+        self._mover = _TrueBody(body, self._time, self.clock)
         self._bus = self._network.attach(self.name, self._take, kinds=role.hears)
         self.shell = shell = PeerShell(
             role,
-            _TrueBody(body, self._time, self.clock),
+            self._mover,
             self,
             name=self.name,
             team=self._mission.team,
@@ -206,6 +230,7 @@ class SimulatedPeer:
             self.disk.fail()
             self._bus.close(noticed_after_s)
             self.shell = self.role = self.allegiance = self._waiting = self._held = None
+            self._parts.clear()
             self._due_s = math.inf
         if lose_disk:
             self.disk.content = None
@@ -281,8 +306,8 @@ class SimulatedPeer:
     def _end_event(self) -> None:
         if self._held is not None and self._waiting is None:
             self._waiting = Inbox()
-        if self._watch is not None:
-            self._watch(self)
+        if self.watch is not None:
+            self.watch(self)
         self._sleep()
 
     def _execute(self, job: Compute) -> None:
@@ -313,15 +338,12 @@ class SimulatedPeer:
             self._end_event()
 
 
-def part_of(role: Role, kind: type[APart]) -> APart | None:
-    """The part of this kind of a role that is composed of parts; None if it has none."""
-    return next((part for part in getattr(role, "parts", ()) if isinstance(part, kind)), None)
-
-
 class _TrueBody:
     """A body as the mind has it: it moves by true time, and never for longer than it was told by either clock."""
 
     def __init__(self, body: DiscDriver, time: VirtualTime, clock: SimulatedClock) -> None:
+        self.until_s = -math.inf
+        """When it stands if it is told nothing more."""
         self._body, self._time, self._clock = body, time, clock
 
     def advance(self, _now_s: float) -> None:
@@ -331,4 +353,6 @@ class _TrueBody:
         return self._body.pose()
 
     def drive(self, velocity: Point, for_s: float) -> None:
-        self._body.drive(velocity, min(for_s, for_s / self._clock.rate))
+        for_s = min(for_s, for_s / self._clock.rate)
+        self.until_s = self._time.now_s + for_s if velocity != (0.0, 0.0) else -math.inf
+        self._body.drive(velocity, for_s)

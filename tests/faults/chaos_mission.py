@@ -90,6 +90,7 @@ def draw_case(seed: int) -> ChaosCase:
     robots = chance.randint(3, 7)
     duration_s = float(chance.randint(30, 60))
     voters = ("base", *robot_names(robots))
+    loses_disks = chance.random() < 0.15
     faults: list[Fault] = []
     if chance.random() < 0.5:
         faults += draw_clocks(chance, voters)
@@ -99,7 +100,7 @@ def draw_case(seed: int) -> ChaosCase:
         for_s = _round(min(chance.expovariate(0.5) + 0.05, LONGEST_FAULT_S, duration_s - QUIET_S - begins_s))
         if for_s < 0.05:
             break
-        faults.append(draw_fault(chance, voters, _round(begins_s), for_s))
+        faults.append(draw_fault(chance, voters, _round(begins_s), for_s, loses_disks=loses_disks))
     if chance.random() < 0.1:
         faults.append(Kill(at_s=_round(chance.uniform(3.0, duration_s - QUIET_S)), who=chance.choice(voters)))
     return ChaosCase(seed, robots, duration_s, tuple(sorted(faults, key=lambda fault: fault.at_s)))
@@ -114,7 +115,7 @@ def draw_clocks(chance: Random, voters: Sequence[str]) -> list[Fault]:
     ]
 
 
-def draw_fault(chance: Random, voters: Sequence[str], at_s: float, for_s: float) -> Fault:
+def draw_fault(chance: Random, voters: Sequence[str], at_s: float, for_s: float, *, loses_disks: bool = False) -> Fault:
     """One fault of any kind."""
     who = LEADER if chance.random() < 0.4 else chance.choice((*voters, "agent"))
     some = tuple(chance.sample(voters, chance.randint(1, len(voters) - 1)))
@@ -123,7 +124,7 @@ def draw_fault(chance: Random, voters: Sequence[str], at_s: float, for_s: float)
     share = _round(chance.choice((0.1, 0.3, 0.6)))
     match chance.choices(_KINDS, _WEIGHTS)[0]:
         case "kill":
-            disk: Literal["kept", "lost"] = "lost" if chance.random() < 0.15 else "kept"
+            disk: Literal["kept", "lost"] = "lost" if loses_disks and chance.random() < 0.5 else "kept"
             late_s = chance.choice((0.0, 0.0, 1.0, 3600.0))
             return Kill(at_s=at_s, for_s=for_s, who=who, disk=disk, noticed_after_s=late_s)
         case "pause":

@@ -1,0 +1,144 @@
+"""What must never happen in a simulated team, looked for after every event.
+
+The rules see more than any peer does: true time, all minds, all disks. They are told by what peers say and by what they
+hold to be true; none of them asks the code that they judge whether it did right. Each kind of rule is a class of its
+own: leases and obedience here, orders and motion in :mod:`launcher.order_rules`, trees in :mod:`launcher.tree_rules`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+from agents.mission import Mission
+from agents.shared_estimate import SharedEstimate
+from launcher.fault_timetable import Kill, Timetable
+from launcher.order_rules import MotionRules, OrderRules
+from launcher.simulated_peer import SimulatedPeer
+from launcher.simulation import SimulatedTeam
+from launcher.tree_rules import TreeRules
+from launcher.violation import Violation
+from protocol.messages import Envelope, Reign, decode
+
+LOOK_S = 1.0
+"""How often it is looked what peers know."""
+
+JUDGED_KINDS = frozenset({"deployment", "topology", "auction", "confirmation", "state", "vote_request"})
+
+
+class Rules(Protocol):
+    """Some rules. What they find they raise as a :class:`~launcher.violation.Violation`."""
+
+    def hear(self, peer: SimulatedPeer, envelope: Envelope) -> None:
+        """Judge what a peer says, at the moment at which it decides to."""
+
+    def look(self, peer: SimulatedPeer) -> None:
+        """Judge a peer that has just handled an event."""
+
+
+class Invariants:
+    """All rules, for one team.
+
+    Args:
+        mission: of the team.
+        team: has not begun; its peers are watched from now on.
+        faults: that happen to it. Where a disk is lost, two reigns may have the same epoch one after the other, and
+            what is numbered by epochs is not judged.
+    """
+
+    def __init__(self, mission: Mission, team: SimulatedTeam, faults: Timetable) -> None:
+        keeps_disks = not any(isinstance(fault, Kill) and fault.disk == "lost" for fault in faults.faults)
+        self._team = team
+        self._agent = team.peers[mission.tracked_agent.name]
+        self._rules: Sequence[Rules] = (OfficeRules(team.peers, keeps_disks), OrderRules(keeps_disks))
+        if keeps_disks:
+            self._rules += (MotionRules(team.peers), TreeRules(mission.voters.voters))
+        self._found: Violation | None = None
+        for peer in team.peers.values():
+            peer.said, peer.watch = self._hear, self._look
+        team.time.call_at(LOOK_S, self._look_at_all)
+
+    def _hear(self, peer: SimulatedPeer, key: str, payload: bytes) -> None:
+        """Called in the middle of an event, where whatever is raised would count as a failure of the role."""
+        if key.rpartition("/")[2] in JUDGED_KINDS and self._found is None:
+            envelope = decode(payload)
+            try:
+                for rules in self._rules:
+                    rules.hear(peer, envelope)
+            except Violation as violation:
+                self._found = violation
+
+    def _look(self, peer: SimulatedPeer) -> None:
+        if self._found is not None:
+            raise self._found
+        if peer.shell is not None and peer.shell.faults:
+            raise Violation("roles fail on nothing", f"{peer.name} failed on an event: see its log")
+        for rules in self._rules:
+            rules.look(peer)
+
+    def _look_at_all(self) -> None:
+        """What costs more."""
+        place = self._agent.place
+        for peer in self._team.peers.values():
+            estimate = peer.part(SharedEstimate)
+            if estimate is not None and not estimate.contains(place, peer.now_s):
+                raise Violation("the agent is inside every set", f"it is at {place}, and not for {peer.name}")
+        self._team.time.call_at(self._team.time.now_s + LOOK_S, self._look_at_all)
+
+
+class OfficeRules:
+    """At any moment of true time at most one peer believes that it holds a lease, and all who obey obey that one.
+
+    Args:
+        peers: of the team, by name.
+        keeps_disks: whether no disk is lost, so that every reign has a greater epoch than all before.
+    """
+
+    def __init__(self, peers: Mapping[str, SimulatedPeer], keeps_disks: bool) -> None:
+        self._peers, self._keeps_disks = peers, keeps_disks
+        self._known: dict[str, object] = {}
+        """What each peer's lease and obedience were when they were looked at last."""
+        self._last: Reign | None = None
+        """The last reign that began."""
+
+    def hear(self, peer: SimulatedPeer, envelope: Envelope) -> None:
+        """Nothing: what is said is for other rules."""
+
+    def look(self, peer: SimulatedPeer) -> None:
+        """Compare with all others, if lease or obedience is another. They end by themselves, and begin at events."""
+        own = peer.allegiance
+        if own is None:
+            return
+        election = own.election
+        now = (election.office, election.lease_until_s, election.obedience.last, election.obedience.until_s)
+        if self._known.get(peer.name) == now:
+            return
+        self._known[peer.name] = now
+        leads, obeyed = own.leads(peer.now_s), own.obeyed(peer.now_s)
+        if leads and own.reign != self._last:
+            self._begin(own.reign)
+        for other in self._peers.values():
+            theirs = other.allegiance
+            if theirs is None or other is peer:
+                continue
+            if leads and theirs.leads(other.now_s):
+                raise Violation("one leads", f"{peer.name} and {other.name} hold leases")
+            follows = theirs.obeyed(other.now_s)
+            if leads and follows is not None and follows.leader != peer.name:
+                raise Violation("who obeys obeys who leads", f"{other.name} obeys {follows.leader}, {peer.name} leads")
+            if obeyed is None:
+                continue
+            if follows is not None and _process(follows) != _process(obeyed):
+                text = f"{peer.name} obeys {_process(obeyed)}, {other.name} obeys {_process(follows)}"
+                raise Violation("all obey the same", text)
+            if theirs.leads(other.now_s) and obeyed.leader != other.name:
+                raise Violation("who obeys obeys who leads", f"{peer.name} obeys {obeyed.leader}, {other.name} leads")
+
+    def _begin(self, reign: Reign | None) -> None:
+        if self._keeps_disks and self._last is not None and reign is not None and reign.epoch <= self._last.epoch:
+            raise Violation("epochs rise", f"epoch {reign.epoch} of {reign.leader} after {self._last.epoch}")
+        self._last = reign
+
+
+def _process(reign: Reign) -> tuple[str, int]:
+    return reign.leader, reign.incarnation

@@ -1,0 +1,174 @@
+"""Rules on orders and on what robots do by them: who may give one, when it may be taken, how far it lets anybody go."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Final
+
+from agents.motion_message import end_stage, piece
+from agents.standing_orders import StandingOrders
+from launcher.simulated_peer import SimulatedPeer
+from launcher.violation import Violation
+from protocol.messages import Authority, Deployment, Envelope, MemberWay, Motion, Progress, State, Warrant
+
+REMEMBERED_S: Final = 30.0
+"""Orders are remembered for so long; none can be taken that is older."""
+
+OFF_M: Final = 0.02
+"""Bodies are no farther than this from their ways."""
+
+ROUNDING_S: Final = 1e-6
+
+
+class OrderRules:
+    """Orders are given within a lease only, taken while the lease runs that they were given in, and in their order.
+
+    Args:
+        keeps_disks: whether no disk is lost; otherwise epochs may begin again, and with them the order.
+    """
+
+    def __init__(self, keeps_disks: bool) -> None:
+        self._keeps_disks = keeps_disks
+        self._given: dict[tuple[int, str, int], float] = {}
+        """Deployments by epoch, leader and sequence: when the lease ends that they were given in, by true time."""
+        self._taken: dict[str, Authority] = {}
+        """The last that each peer took."""
+
+    def hear(self, peer: SimulatedPeer, envelope: Envelope) -> None:
+        """Who says what bears a warrant must hold a lease."""
+        warrant = getattr(envelope.body, "warrant", None)
+        if not isinstance(warrant, Warrant):
+            return
+        if peer.allegiance is None or not peer.allegiance.leads(peer.now_s):
+            raise Violation("orders are given within a lease", f"{peer.name} says {envelope.kind} without one")
+        if isinstance(envelope.body, Deployment):
+            authority = envelope.body.authority
+            ends_s = peer.clock.when(peer.now_s + warrant.lease_s)
+            self._given[authority.epoch, authority.leader, authority.sequence] = ends_s
+            self._forget(ends_s - REMEMBERED_S)
+
+    def look(self, peer: SimulatedPeer) -> None:
+        """What it has taken last must be in time, and later than what it took before."""
+        orders = peer.part(StandingOrders)
+        latest = None if orders is None else orders.latest
+        before = self._taken.get(peer.name)
+        if latest is None or latest.authority is before:
+            return
+        authority = latest.authority
+        self._taken[peer.name] = authority
+        if before is not None and self._keeps_disks and _order(authority) <= _order(before) and authority != before:
+            text = f"{peer.name} takes {_order(authority)} after {_order(before)}"
+            raise Violation("no older order after a newer one", text)
+        ends_s = self._given.get((authority.epoch, authority.leader, authority.sequence))
+        if ends_s is None:
+            raise Violation("orders taken have been given", f"{peer.name} takes {_order(authority)}, which nobody gave")
+        late_s = peer.true_s - ends_s
+        if late_s > ROUNDING_S:
+            text = f"{peer.name} takes {_order(authority)} {late_s:.3f} s after the lease that it was given in"
+            raise Violation("no order is taken when its lease has ended", text)
+
+    def _forget(self, before_s: float) -> None:
+        while self._given and (first := next(iter(self._given))) and self._given[first] < before_s:
+            del self._given[first]
+
+
+class MotionRules:
+    """Robots go where and as far as was ordered, never ahead of each other, and only while they obey.
+
+    Args:
+        peers: of the team, by name.
+    """
+
+    def __init__(self, peers: Mapping[str, SimulatedPeer]) -> None:
+        self._peers = peers
+        self._motions: dict[tuple[int, int, int], Motion] = {}
+        """By epoch, plan and revision, as ordered first."""
+        self._released: dict[tuple[int, int], int] = {}
+        """The last stage that each plan of an epoch lets anybody begin."""
+        self._progress: dict[str, tuple[int, Progress]] = {}
+        """What each robot said last, and its incarnation."""
+
+    def hear(self, peer: SimulatedPeer, envelope: Envelope) -> None:
+        """Remember what is ordered; hold what robots say of themselves against it, and against where they truly are."""
+        body = envelope.body
+        if isinstance(body, Deployment) and body.motion is not None:
+            epoch, motion = body.authority.epoch, body.motion
+            self._motions.setdefault((epoch, motion.plan, motion.revision), motion)
+            key = (epoch, motion.plan)
+            self._released[key] = max(self._released.get(key, -1), motion.released)
+            if len(self._motions) > 200:
+                del self._motions[next(iter(self._motions))]
+        elif isinstance(body, State) and body.progress is not None:
+            self._judge(peer, envelope.incarnation, body.progress)
+
+    def look(self, peer: SimulatedPeer) -> None:
+        """No body moves for longer than its mind obeys."""
+        if peer.allegiance is None or peer.drives_until_s <= peer.true_s:
+            return
+        late_s = peer.drives_until_s - peer.clock.when(peer.allegiance.obeyed_until_s)
+        if late_s > ROUNDING_S:
+            raise Violation("nobody moves who obeys nobody", f"{peer.name} is to drive {late_s:.3f} s longer")
+
+    def _judge(self, peer: SimulatedPeer, incarnation: int, progress: Progress) -> None:
+        name = peer.name
+        before_incarnation, before = self._progress.get(name, (-1, None))
+        self._progress[name] = (incarnation, progress)
+        if before is not None and before_incarnation == incarnation and _steps(progress) < _steps(before):
+            raise Violation("nobody goes back", f"{name} goes from {_steps(before)} to {_steps(progress)}")
+        motion = self._motions.get((progress.epoch, progress.plan, progress.revision))
+        if motion is None:
+            raise Violation("motions accepted were ordered", f"{name} follows {_steps(progress)}, which nobody ordered")
+        way = next((way for way in motion.ways if way.member == name), None)
+        if way is None:
+            raise Violation("motions accepted are one's own", f"{name} has no way in {_steps(progress)}")
+        self._judge_place(peer, way, motion, progress)
+
+    def _judge_place(self, peer: SimulatedPeer, way: MemberWay, motion: Motion, progress: Progress) -> None:
+        """Whether the body is where its progress lets it be."""
+        stage, place = progress.finished - motion.first_stage, peer.place
+        if not 0 <= stage <= end_stage(motion) - motion.first_stage:
+            return  # a later message had the rest of it
+        onset = way.waypoints[way.stages[stage]]
+        if math.dist(place, onset) <= OFF_M:
+            return
+        name, number = peer.name, progress.finished
+        if number == end_stage(motion) or _distance(place, piece(way, stage)) > OFF_M:
+            raise Violation("everybody is on their way", f"{name} is at {place}, off stage {number}")
+        if number > self._released[progress.epoch, progress.plan]:
+            raise Violation("nobody goes beyond what is released", f"{name} is in stage {number}")
+        for other in motion.ways:
+            if other.member == name or not other.scheduled or other.member not in self._peers:
+                continue
+            finished = self._finished(other.member, progress)
+            behind = range(max(finished, motion.first_stage), number - 1)
+            if any(other.stages[n - motion.first_stage] < other.stages[n - motion.first_stage + 1] for n in behind):
+                text = f"{name} is in stage {number}, {other.member} has finished {finished}"
+                raise Violation("nobody is two stages ahead", text)
+
+    def _finished(self, member: str, progress: Progress) -> int:
+        """Stages of this plan that a member has said to have finished."""
+        known = self._progress.get(member)
+        if known is None or (known[1].epoch, known[1].plan) != (progress.epoch, progress.plan):
+            return 0
+        return known[1].finished
+
+
+def _order(authority: Authority) -> tuple[int, int]:
+    return authority.epoch, authority.sequence
+
+
+def _steps(progress: Progress) -> tuple[int, int, int, int]:
+    return progress.epoch, progress.plan, progress.revision, progress.finished
+
+
+def _distance(place: tuple[float, float], path: tuple[tuple[float, float], ...]) -> float:
+    """Of a place from a path, metres."""
+    least = math.dist(place, path[0])
+    for (ax, ay), (bx, by) in pairwise(path):
+        dx, dy = bx - ax, by - ay
+        along = ((place[0] - ax) * dx + (place[1] - ay) * dy) / ((dx * dx + dy * dy) or 1.0)
+        share = min(1.0, max(0.0, along))
+        least = min(least, math.dist(place, (ax + share * dx, ay + share * dy)))
+    return least
