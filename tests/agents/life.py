@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from agents.driver import DiscDriver
 from agents.records import AnyRecord, LogLine
-from agents.role import Compute, Drive, Effect, Event, Publish, Record, Role, WakeAt, Woken
+from agents.role import Compute, Drive, Effect, Event, Persist, Publish, Record, Role, WakeAt, Woken
 from protocol.messages import AnyBody, Body, Point
 
 Kind = TypeVar("Kind", bound=Body)
@@ -23,6 +23,7 @@ class Life:
         self.said: list[tuple[float, AnyBody]] = []
         self.records: list[AnyRecord] = []
         self.jobs: list[Compute] = []
+        self.promises: list[Persist] = []
         self.driver.advance(0.0)
         self.do(role.start(0.0, start))
 
@@ -39,6 +40,8 @@ class Life:
                     self.wake_at_s = time_s
                 case Compute():
                     self.jobs.append(effect)
+                case Persist():
+                    self.promises.append(effect)
 
     def live_until(self, time_s: float) -> None:
         while self.wake_at_s <= time_s:
