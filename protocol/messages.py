@@ -43,6 +43,9 @@ Count: TypeAlias = Annotated[int, msgspec.Meta(ge=0, le=2**53 - 1)]
 Seconds: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0)]
 """A duration."""
 
+Share: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
+"""A part of one whole."""
+
 Extent: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=1e7)]
 """A radius in metres, or a speed in metres per second."""
 
@@ -355,6 +358,16 @@ class Confirmation(Body, frozen=True, kw_only=True, tag="confirmation"):
     """The last tree in force that it knows of: what a new leader starts from."""
 
 
+class Aim(msgspec.Struct, frozen=True, kw_only=True):
+    """What a chain may be for: places where the agent may be, now or some metres on."""
+
+    places: Annotated[tuple[Point, ...], msgspec.Meta(min_length=1, max_length=2000)]
+    shares: Annotated[tuple[Share, ...], msgspec.Meta(min_length=1, max_length=2000)]
+    """What each place counts for, of sum 1."""
+    ahead_m: Extent
+    """So far the agent has to go until it is at the farthest of them."""
+
+
 class Auction(Body, frozen=True, kw_only=True, tag="auction"):
     """The leader asks what could be gained by another link in the place of one of the present tree's.
 
@@ -368,25 +381,25 @@ class Auction(Body, frozen=True, kw_only=True, tag="auction"):
     """Number of the auction in this epoch."""
     closes_in_s: Seconds
     """Bids that come later are not counted."""
-    way: Annotated[tuple[Point, ...], msgspec.Meta(min_length=1, max_length=1000)]
-    """The agent's, from where it is."""
+    center: Point
+    """In the middle of where the agent is."""
+    aims: Annotated[tuple[Aim, ...], msgspec.Meta(min_length=1, max_length=16)]
+    """What chains are asked for."""
     robots: Annotated[tuple[Placement, ...], msgspec.Meta(max_length=64)]
     """Where the robots are that can be counted on."""
     standing: Annotated[tuple[Name, ...], msgspec.Meta(max_length=64)]
     """The relays of the present chain from the base station outward."""
     obstacles: Annotated[tuple[Point, ...], msgspec.Meta(max_length=1000)] = ()
     """Where nobody can stand."""
-    targets: Annotated[tuple[Point, ...], msgspec.Meta(max_length=1000)] = ()
-    """Where an agent that tells nothing may be; none of one that announces its way."""
 
 
 class Offer(msgspec.Struct, frozen=True, kw_only=True):
-    """The best chain that a bidder has found for one stretch of the agent's way."""
+    """The best chain that a bidder has found for an aim."""
 
-    ahead_m: Extent
-    """How far the agent will be on its way."""
+    aim: Count
+    """Its place in the auction's list."""
     whole: bool
-    """Whether the last relay sees all of the way until there."""
+    """Whether the last relay sees all of its places."""
     total_cost_m: Extent
     """What the chain costs, in metres: driving, relays and links."""
     cost: Extent
@@ -405,7 +418,7 @@ class Bid(Body, frozen=True, kw_only=True, tag="bid"):
     epoch: Count
     auction: Count
     offers: Annotated[tuple[Offer, ...], msgspec.Meta(max_length=64)]
-    """At most one for each stretch and kind of chain; none where the bidder has found no chain."""
+    """At most one for each aim; none where the bidder has found no chain."""
 
 
 class RangeRequest(Body, frozen=True, kw_only=True, tag="range_request"):

@@ -22,6 +22,7 @@ from protocol import keys, messages
 from protocol.messages import (
     BODIES,
     PERIODIC_KINDS,
+    Aim,
     AnyBody,
     Auction,
     Authority,
@@ -198,7 +199,8 @@ EXAMPLES: Final[tuple[AnyBody, ...]] = (
         warrant=Warrant(lease_s=0.84, marks=(LastHeard(peer="base", mark="0.56"),)),
         auction=5,
         closes_in_s=0.25,
-        way=((9.0, 3.5), (9.0, 8.0)),
+        center=(9.0, 3.5),
+        aims=(Aim(places=((9.0, 3.5), (9.0, 7.5)), shares=(0.0, 1.0), ahead_m=4.0),),
         robots=(
             Placement(robot="robot1", position=(7.0, 3.0)),
             Placement(robot="robot2", position=(9.0, 2.5)),
@@ -210,7 +212,7 @@ EXAMPLES: Final[tuple[AnyBody, ...]] = (
         auction=5,
         offers=(
             Offer(
-                ahead_m=4.0,
+                aim=0,
                 whole=True,
                 total_cost_m=14.2,
                 cost=2.1,
@@ -377,6 +379,7 @@ def _page() -> str:
             Milestone,
             LinkView,
             Offer,
+            Aim,
             SharedRange,
             HeardRanges,
             ConvexPiece,
