@@ -18,6 +18,7 @@ Where nodes may idle, a branch without an end sends no message: it would be left
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Final
 
@@ -67,10 +68,13 @@ def best_modification(links: Links, move: Floats, tree: Ints, ends: list[int]) -
     return (exchanges[0].cost, exchanges[0].applied(tree)) if exchanges else (cost, tree)
 
 
-def find_exchanges(links: Links, move: Floats, tree: Ints, ends: list[int]) -> tuple[float, list[Exchange]]:
+def find_exchanges(
+    links: Links, move: Floats, tree: Ints, ends: list[int], cuts: Collection[Edge] | None = None
+) -> tuple[float, list[Exchange]]:
     """For each edge of a tree the one that is best in its place, where that makes the tree cheaper.
 
-    Arguments and complexity as of :func:`best_modification`.
+    Arguments and complexity as of :func:`best_modification`; of the edges only those in ``cuts`` are exchanged, if that
+    is given.
 
     Returns:
         The cost of the tree as it is, inf if it cannot be placed, and the exchanges, the cheapest tree first.
@@ -78,11 +82,11 @@ def find_exchanges(links: Links, move: Floats, tree: Ints, ends: list[int]) -> t
     messages = _Messages(links, move, tree, ends)
     cost = float(messages.rooted(ends[0]).min())
     exchanges = []
-    cuts = messages.cuts()
-    smaller = [min(sides, key=lambda side: len(side.nodes)) for sides in cuts]
+    parted = messages.cuts(cuts)
+    smaller = [min(sides, key=lambda side: len(side.nodes)) for sides in parted]
     rows = [side.rooted for side in smaller]
     hung = np.split(min_plus(links, np.concatenate(rows)), np.cumsum([len(row) for row in rows])[:-1]) if rows else []
-    for (first, second), near, hanging in zip(cuts, smaller, hung, strict=True):
+    for (first, second), near, hanging in zip(parted, smaller, hung, strict=True):
         far = second if near is first else first
         totals = (far.rooted[:, None] + hanging).min(axis=2)
         place, other = np.unravel_index(np.argmin(totals), totals.shape)
@@ -138,9 +142,13 @@ class _Messages:
                 total += side.arriving[i]
         return total
 
-    def cuts(self) -> list[tuple[_Side, _Side]]:
-        """Both sides of each edge that has ends on either side."""
-        cuts = [(_Side((i, j)), _Side((j, i))) for i, j in self._edges if self._ends[i, j] and self._ends[j, i]]
+    def cuts(self, among: Collection[Edge] | None) -> list[tuple[_Side, _Side]]:
+        """Both sides of each edge that has ends on either side, of all edges or of some."""
+        cuts = [
+            (_Side((i, j)), _Side((j, i)))
+            for i, j in self._edges
+            if self._ends[i, j] and self._ends[j, i] and (among is None or (i, j) in among or (j, i) in among)
+        ]
         sides = [side for pair in cuts for side in pair]
         steps = [(side, side.cut[0], n) for side in sides for n in self._neighbours[side.cut[0]] if n != side.cut[1]]
         while steps:
