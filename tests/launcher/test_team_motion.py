@@ -5,7 +5,6 @@ Bodies are looked at fifty times a second, between what they record too.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cache
 from itertools import combinations
 
@@ -16,12 +15,12 @@ from msgspec import structs
 import maps
 from agents.casting import Casting
 from agents.mission import Mission, Wandering
-from agents.records import AnyRecord, LogLine, Ordered
+from agents.records import AnyRecord, LogLine, Office, Ordered
+from launcher.fault_timetable import Fault, Kill, Partition, Timetable
 from launcher.mission_trace import MissionTrace
 from launcher.report import Metrics, measure
-from launcher.simulation import SimulatedPeer, simulate
+from launcher.simulation import SimulatedTeam, simulate
 from planning.environment import Environment
-from protocol.simulated_bus import SimulatedNetwork, VirtualTime
 from tests.launcher.test_simulation import team
 
 STARTS = [(1.0, 10.0), (1.5, 10.0), (2.0, 10.0), (2.5, 10.0)]
@@ -39,36 +38,31 @@ def mission(seed: int) -> Mission:
 
 
 class Stage:
-    """A simulation in which the test may do harm."""
+    """A simulation that is looked at in between."""
 
-    def __init__(self, seed: int, loss: float = 0.0) -> None:
+    def __init__(self, seed: int, *faults: Fault, loss: float = 0.0) -> None:
         self.mission = mission(seed)
-        self.time = VirtualTime()
-        self.network = SimulatedNetwork(self.time, seed, loss=loss)
         self.records: list[tuple[float, str, AnyRecord]] = []
-        self.casting = Casting(self.mission, office())
-        self.peers = {entry.name: self.cast(entry.name) for entry in self.mission.roster}
-        self.nearest_m = np.inf
-
-    def cast(self, name: str) -> SimulatedPeer:
-        return SimulatedPeer(
-            self.time, self.network, self.casting, self.mission, name,
+        self.team = SimulatedTeam(
+            self.mission,
+            Casting(self.mission, office()),
             lambda time_s, peer, record: self.records.append((time_s, peer, record)),
-        )  # fmt: skip
+            faults=Timetable(faults=faults),
+            loss=loss,
+        )
+        self.nearest_m = np.inf
 
     def run(self, until_s: float) -> None:
         robots = [entry.name for entry in self.mission.robots]
-        while self.time.now_s < until_s:
-            self.time.run_until(min(self.time.now_s + 0.02, until_s))
-            places = []
-            for name in robots:
-                self.peers[name]._driver.advance(self.time.now_s)
-                places.append(self.peers[name]._driver.pose())
+        time = self.team.time
+        while time.now_s < until_s:
+            time.run_until(min(time.now_s + 0.02, until_s))
+            places = [self.team.peers[name].place for name in robots]
             gaps = [np.hypot(*np.subtract(one, other)) for one, other in combinations(places, 2)]
             self.nearest_m = min(self.nearest_m, *gaps)
 
     def measure(self) -> Metrics:
-        return measure(MissionTrace.of(self.records, self.mission, self.time.now_s), office())
+        return measure(MissionTrace.of(self.records, self.mission, self.team.time.now_s), office())
 
     def warnings(self) -> list[str]:
         return [record.text for _, _, record in self.records if isinstance(record, LogLine) and record.level != "info"]
@@ -76,8 +70,6 @@ class Stage:
 
 def test_nobody_touches_anybody_and_the_network_is_certified() -> None:
     stage = Stage(3)
-    for peer in stage.peers.values():
-        peer.start()
     stage.run(15.0)
     assert stage.nearest_m > 0.4 - 1e-6
     metrics = stage.measure()
@@ -92,38 +84,15 @@ def test_nobody_touches_anybody_and_the_network_is_certified() -> None:
     assert metrics.since_first_deployment.chain_connected > 0.97
 
 
-def cut_off(stage: Stage, name: str) -> None:
-    """Nobody hears it any more, nor it anybody; it goes on as it was told."""
-    stage.peers[name]._shell._bus.close()
+CUT_OFF = Partition(at_s=6.0, for_s=7.0, group=("robot2",))
+"""Nobody hears it any more, nor it anybody."""
+CRASH = Kill(at_s=6.0, for_s=7.0, who="robot2")
+"""The mind is gone, and the body stands when its last command has run out."""
 
 
-def crash(stage: Stage, name: str) -> None:
-    """The mind is gone, and the body stands when its last command has run out."""
-    cut_off(stage, name)
-    stage.peers[name]._due_s = np.nan
-
-
-@pytest.mark.parametrize("harm", [cut_off, crash])
-def test_a_robot_that_is_lost_is_in_nobodys_way_and_taken_in_again(harm: Callable[[Stage, str], None]) -> None:
-    stage = Stage(4)
-    for peer in stage.peers.values():
-        peer.start()
-    stage.run(6.0)
-    harm(stage, "robot2")
-    stage.run(13.0)
-    lost = stage.peers["robot2"]
-    place = lost._driver.pose()
-    stage.mission = structs.replace(
-        stage.mission,
-        roster=tuple(
-            structs.replace(entry, start=place) if entry.name == "robot2" else entry for entry in stage.mission.roster
-        ),
-    )
-    stage.casting = Casting(stage.mission, office())
-    stage.peers["robot2"] = again = stage.cast("robot2")
-    lost._due_s = np.nan  # from now on the new process drives the body
-    again.start()
-    again._shell._incarnation = 1
+@pytest.mark.parametrize("harm", [CUT_OFF, CRASH])
+def test_a_robot_that_is_lost_is_in_nobodys_way_and_taken_in_again(harm: Fault) -> None:
+    stage = Stage(4, harm)
     stage.run(17.0)
     assert stage.nearest_m > 0.4 - 1e-6
     orders = [(time_s, record.motion) for time_s, _, record in stage.records if isinstance(record, Ordered)]
@@ -135,12 +104,29 @@ def test_a_robot_that_is_lost_is_in_nobodys_way_and_taken_in_again(harm: Callabl
     assert not metrics.failures
 
 
+@pytest.mark.parametrize("deaths", [1, 2])
+def test_a_leader_that_dies_in_motion_is_replaced_and_the_team_drives_on(deaths: int) -> None:
+    """Nobody touches anybody, the chain holds all the same, and each epoch's plans begin from a standstill."""
+    faults = [Kill(at_s=at_s, for_s=1.0, who="leader") for at_s in (5.0, 9.0)[:deaths]]
+    stage = Stage(4, *faults)
+    stage.run(16.0)
+    assert stage.nearest_m > 0.4 - 1e-6
+    reigns = {record.leads.epoch for _, _, record in stage.records if isinstance(record, Office) and record.leads}
+    assert len(reigns) >= 1 + len(faults)
+    metrics = stage.measure()
+    assert metrics.errors == 0
+    assert not metrics.failures
+    assert metrics.plans >= len(reigns)
+    assert metrics.since_first_deployment is not None
+    assert metrics.since_first_deployment.chain_connected > 0.9
+    driven = [time_s for time_s, _, record in stage.records if isinstance(record, Ordered) and record.motion.revision]
+    assert max(driven) > faults[-1].at_s + 2.0
+
+
 @pytest.mark.parametrize("loss", [0.1, 0.3])
 def test_messages_may_be_lost(loss: float) -> None:
     """Who has not heard of a release or of another's progress waits for the next time that it is said."""
-    stage = Stage(5, loss)
-    for peer in stage.peers.values():
-        peer.start()
+    stage = Stage(5, loss=loss)
     stage.run(12.0)
     assert stage.nearest_m > 0.4 - 1e-6
     metrics = stage.measure()
