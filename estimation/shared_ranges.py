@@ -36,6 +36,9 @@ from estimation.range_log import BadRecord, Heard, Key, RangeLog, TimedRange
 _FINGERPRINTS = 1 << 48
 """So many there are: numbers that every JSON reader holds exactly."""
 
+_TAIL_S = 10.0
+"""By so much the bases of peers can end at different times, seconds."""
+
 _MARK_EVERY = 16
 """Ranges between two kept states: a late range costs a replay from the mark before it."""
 
@@ -127,6 +130,8 @@ class SharedRanges(Generic[StateT]):
         self._digests: dict[str, Digest] = {}
         self._base: tuple[Key | None, StateT] = (None, begin())
         self._marks: list[tuple[Key, StateT]] = []
+        self._tail: list[TimedRange] = []
+        """The last ones folded: a base that is adopted may end before them."""
         self._now: tuple[Key | None, StateT] = (None, begin())
         self._last_s = -math.inf
         self._late = self._folded = self._fingerprint = 0
@@ -256,12 +261,14 @@ class SharedRanges(Generic[StateT]):
         own = self.base()
         if own is not None and _misses(base.heard, own.heard) and _rank(own) >= _rank(base):
             return False
-        kept = self._log.after(base.key)
-        dropped = list(self._log)[: len(self._log) - len(kept)]
+        known = [*self._tail, *self._log]
+        kept = [record for record in known if record.key > base.key]
+        dropped = [record for record in self._log if record.key <= base.key]
         self._late += sum(record.number not in base.heard.get(record.peer, Heard()) for record in dropped)
         self._log = RangeLog(kept)
         for peer, heard in base.heard.items():
             self._log.skip_below(peer, heard.below)
+        self._tail = []
         self._base = base.key, deepcopy(base.state)
         self._fingerprint = base.fingerprint
         self._marks = []
@@ -310,6 +317,7 @@ class SharedRanges(Generic[StateT]):
         if self._now[0] is None or self._now[0] < end:
             self._now = end, deepcopy(state)
         self._log.release(len(records))
+        self._tail = [record for record in (*self._tail, *records) if record.time_s > end[0] - _TAIL_S]
         self._folded += len(records)
         self._fingerprint = sum((record.fingerprint for record in records), self._fingerprint) % _FINGERPRINTS
 
