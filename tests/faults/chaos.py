@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from hashlib import sha256
 
 import msgspec
 
-from agents.casting import Casting
-from agents.mission import Mission
 from agents.records import AnyRecord, LogLine, Mishap
 from launcher.fault_timetable import Disk
 from launcher.invariants import Invariants
@@ -19,6 +16,7 @@ from launcher.simulation import SimulatedTeam
 from launcher.violation import Violation
 from tests.faults.chaos_mission import ChaosCase
 from tests.faults.light_team import LightCasting
+from tests.faults.real_team import real_casting, real_mission
 
 Record = tuple[float, str, AnyRecord]
 
@@ -54,28 +52,28 @@ class Verdict:
         return "\n".join(lines[-last:])
 
 
-def run_chaos(case: ChaosCase, casting: Callable[[Mission], Casting] = LightCasting, *, keep: bool = True) -> Verdict:
+def run_chaos(case: ChaosCase, *, keep: bool = True) -> Verdict:
     """Run a mission until it ends or breaks a rule.
 
     Args:
         case: which mission.
-        casting: gives the peers their roles.
         keep: the history.
     """
-    mission, timetable = case.mission(), case.timetable
+    mission, timetable = real_mission(case) if case.map else case.mission(), case.timetable
+    casting = real_casting(mission) if case.map else LightCasting(mission)
     history: list[Record] = []
 
     def record(time_s: float, peer: str, what: AnyRecord) -> None:
         if keep:
             history.append((time_s, peer, what))
 
-    team = SimulatedTeam(mission, casting(mission), record, faults=timetable)
+    team = SimulatedTeam(mission, casting, record, faults=timetable)
     Invariants(mission, team, timetable)
     full_disks = any(isinstance(fault, Disk) and fault.full for fault in case.faults)
     recovery = RecoveryRules(mission, team, full_disks=full_disks)
     broken = None
     try:
-        team.time.run_until(case.duration_s)
+        team.time.run_until(case.ends_s or case.duration_s)
     except Violation as violation:
         broken = violation
     return Verdict(

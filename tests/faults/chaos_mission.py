@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from random import Random
 from typing import Final, Literal
+
+import msgspec
 
 from agents.mission import Mission, RosterEntry, Scripted
 from launcher.fault_timetable import (
@@ -22,6 +23,7 @@ from launcher.fault_timetable import (
     Partition,
     Pause,
     Timetable,
+    write_timetable,
 )
 from protocol.ballot import CLOCK_DRIFT
 from tests.faults.light_team import DEPTH_M, RADIUS_M, WIDTH_M, lane
@@ -31,15 +33,24 @@ QUIET_S: Final = 8.0
 
 LONGEST_FAULT_S: Final = 6.0
 
+BLACKOUTS: Final = 0.04
+"""Share of the occasions on which all voters, or most of them, are killed at about the same time."""
 
-@dataclass(frozen=True)
-class ChaosCase:
+
+class ChaosCase(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A mission and what goes wrong in it; the same case has the same history, to the last bit."""
 
     seed: int
+    """Of the mission, and of all that is left to chance in it."""
     robots: int
     duration_s: float
-    faults: tuple[Fault, ...]
+    ends_s: float | None = None
+    """When it is broken off; the end if not given."""
+    announces: bool = True
+    """Whether the agent does."""
+    map: str = ""
+    """A packaged map, with the full planner; none: the open room, with the light one."""
+    faults: tuple[Fault, ...] = ()
 
     @property
     def timetable(self) -> Timetable:
@@ -47,7 +58,7 @@ class ChaosCase:
         return Timetable(faults=self.faults)
 
     def mission(self) -> Mission:
-        """What all peers know."""
+        """What all peers know, in the open room."""
         chance = Random(f"{self.seed}/mission")
         goals = tuple(
             (round(chance.uniform(2.0, WIDTH_M - 1.0), 2), DEPTH_M - 1.0) for _ in range(int(self.duration_s / 8.0) + 1)
@@ -74,6 +85,7 @@ class ChaosCase:
             decomposition="inflection",
             duration_s=self.duration_s,
             seed=self.seed,
+            announces=self.announces,
             epoch_unix_s=0.0,
             planning_delay_s=round(chance.choice((0.0, 0.02, 0.1, 0.3)), 3),
         )
@@ -84,26 +96,39 @@ def robot_names(count: int) -> tuple[str, ...]:
     return tuple(f"robot{number}" for number in range(1, count + 1))
 
 
-def draw_case(seed: int) -> ChaosCase:
-    """A team of 5 to 9 peers, 30 to 60 s, and faults of all kinds, most of them one after the other."""
+def draw_case(
+    seed: int, robots: tuple[int, int] = (3, 7), duration_s: tuple[int, int] = (30, 60), *, clocks: bool = True
+) -> ChaosCase:
+    """A mission with faults of all kinds, several of them at a time.
+
+    Args:
+        seed: of everything.
+        robots: least and greatest number of them; base station and agent come on top.
+        duration_s: least and greatest, seconds.
+        clocks: whether they may differ: where an estimate is shared they must not, but for a bound.
+    """
     chance = Random(f"{seed}/case")
-    robots = chance.randint(3, 7)
-    duration_s = float(chance.randint(30, 60))
-    voters = ("base", *robot_names(robots))
+    count = chance.randint(*robots)
+    ends_s = float(chance.randint(*duration_s))
+    voters = ("base", *robot_names(count))
     loses_disks = chance.random() < 0.15
     faults: list[Fault] = []
-    if chance.random() < 0.5:
+    if clocks and chance.random() < 0.5:
         faults += draw_clocks(chance, voters)
     begins_s = 0.0
     while True:
         begins_s += chance.expovariate(1.0 / chance.choice((0.3, 2.5)))
-        for_s = _round(min(chance.expovariate(0.5) + 0.05, LONGEST_FAULT_S, duration_s - QUIET_S - begins_s))
+        for_s = _round(min(chance.expovariate(0.5) + 0.05, LONGEST_FAULT_S, ends_s - QUIET_S - begins_s))
         if for_s < 0.05:
             break
-        faults.append(draw_fault(chance, voters, _round(begins_s), for_s, loses_disks=loses_disks))
+        if chance.random() < BLACKOUTS:
+            faults += draw_blackout(chance, voters, begins_s, for_s)
+        else:
+            faults.append(draw_fault(chance, voters, _round(begins_s), for_s, loses_disks=loses_disks))
     if chance.random() < 0.1:
-        faults.append(Kill(at_s=_round(chance.uniform(3.0, duration_s - QUIET_S)), who=chance.choice(voters)))
-    return ChaosCase(seed, robots, duration_s, tuple(sorted(faults, key=lambda fault: fault.at_s)))
+        faults.append(Kill(at_s=_round(chance.uniform(3.0, ends_s - QUIET_S)), who=chance.choice(voters)))
+    faults.sort(key=lambda fault: fault.at_s)
+    return ChaosCase(seed=seed, robots=count, duration_s=ends_s, faults=tuple(faults))
 
 
 def draw_clocks(chance: Random, voters: Sequence[str]) -> list[Fault]:
@@ -164,3 +189,20 @@ _WEIGHTS: Final = (6, 6, 4, 3, 3, 3, 1, 1, 3)
 def _round(number: float) -> float:
     """To milliseconds, so that timetables can be read."""
     return round(number, 3)
+
+
+def write_case(case: ChaosCase) -> str:
+    """TOML text of a case, which :func:`read_case` reads."""
+    lines = [f"seed = {case.seed}", f"robots = {case.robots}", f"duration_s = {case.duration_s}"]
+    if case.ends_s is not None:
+        lines.append(f"ends_s = {case.ends_s}")
+    if not case.announces:
+        lines.append("announces = false")
+    if case.map:
+        lines.append(f'map = "{case.map}"')
+    return "\n".join(lines) + "\n\n" + write_timetable(case.timetable)
+
+
+def read_case(text: str) -> ChaosCase:
+    """Case of a TOML text."""
+    return msgspec.toml.decode(text, type=ChaosCase)

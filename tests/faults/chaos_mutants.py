@@ -1,0 +1,294 @@
+"""Rules of the protocol left out one at a time: the campaign must find out each of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, Final, TypeAlias
+
+import pytest
+from msgspec import structs
+
+from agents.allegiance import Allegiance
+from agents.dispatcher import Dispatcher
+from agents.movement_authority import MovementAuthority
+from agents.robot import Robot
+from agents.stage_follower import StageFollower
+from protocol.ballot import Ballot
+from protocol.core import Persist
+from protocol.election import Election
+from protocol.held_tree import HeldTree
+from protocol.messages import Authority, Reign, Topology, Tree, Warrant
+from protocol.negotiation import Negotiation
+from protocol.obedience import Obedience
+from protocol.roster import Roster
+from protocol.voter import Voter
+
+Patch: TypeAlias = pytest.MonkeyPatch
+Mutant: TypeAlias = Callable[[Patch], None]
+
+MUTANTS: Final[dict[str, Mutant]] = {}
+"""By name. Each breaks one rule for as long as the patch lasts."""
+
+
+def _mutant(function: Mutant) -> Mutant:
+    MUTANTS[function.__name__] = function
+    return function
+
+
+@_mutant
+def skips_the_write(patch: Patch) -> None:
+    """Promises without a disk."""
+
+    def write(self: Any, reign: Reign, now_s: float) -> None:
+        self._voter.begin(reign, now_s)
+        self._promised(reign, now_s)
+
+    patch.setattr(Election, "_write", write)
+
+
+@_mutant
+def says_before_it_is_written(patch: Patch) -> None:
+    """Promises when it has asked the disk, not when the disk has answered."""
+    write = Election._write
+
+    def write_and_say(self: Any, reign: Reign, now_s: float) -> None:
+        write(self, reign, now_s)
+        self._promised(reign, now_s)
+
+    patch.setattr(Election, "_write", write_and_say)
+
+
+@_mutant
+def does_not_write_its_own_vote(patch: Patch) -> None:
+    """A candidate votes for itself without a promise on disk."""
+    write = Election._write
+
+    def write_for_others(self: Any, reign: Reign, now_s: float) -> None:
+        write(self, reign, now_s)
+        if reign.leader == self._name:
+            self._effects = [effect for effect in self._effects if not isinstance(effect, Persist)]
+            self._promised(reign, now_s)
+
+    patch.setattr(Election, "_write", write_for_others)
+
+
+@_mutant
+def ignores_the_epoch(patch: Patch) -> None:
+    """Promises an epoch again, or an earlier one."""
+    patch.setattr(Voter, "may_promise", lambda self, _reign, now_s: self.is_free(now_s))
+
+
+@_mutant
+def ignores_its_promise(patch: Patch) -> None:
+    """Promises a higher epoch while an earlier promise runs."""
+    patch.setattr(
+        Voter, "may_promise", lambda self, reign, _now_s: self.promise is None or reign.epoch > self.promise.epoch
+    )
+    patch.setattr(Voter, "is_free", lambda _self, _now_s: True)
+
+
+@_mutant
+def votes_at_once_after_a_restart(patch: Patch) -> None:
+    """Does not rest."""
+    begin = Voter.__init__
+
+    def begin_awake(self: Any, promise: Reign | None, lease_s: float, now_s: float) -> None:
+        begin(self, promise, lease_s, now_s)
+        self.rests_until_s = -math.inf
+
+    patch.setattr(Voter, "__init__", begin_awake)
+
+
+@_mutant
+def counts_the_lease_from_the_reply(patch: Patch) -> None:
+    """A leader's lease begins when the votes arrive."""
+    handle, now = Election.handle, [0.0]
+
+    def handle_at(self: Any, event: Any, now_s: float) -> Any:
+        now[0] = now_s
+        return handle(self, event, now_s)
+
+    def count(self: Any, voter: str, correlation: str) -> None:
+        if correlation in self._asked_s:
+            self.count_from(voter, now[0])
+
+    patch.setattr(Election, "handle", handle_at)
+    patch.setattr(Ballot, "count", count)
+
+
+@_mutant
+def counts_votes_of_any_round(patch: Patch) -> None:
+    """Does not compare correlations: a late vote counts for the latest round."""
+
+    def count(self: Any, voter: str, _correlation: str) -> None:
+        self.count_from(voter, max(self._asked_s.values()))
+
+    patch.setattr(Ballot, "count", count)
+
+
+@_mutant
+def is_elected_by_a_minority(patch: Patch) -> None:
+    """One vote less than a majority is enough."""
+    patch.setattr(Roster, "majority", property(lambda self: max(1, len(self.voters) // 2)))
+
+
+@_mutant
+def leads_on_when_its_lease_has_ended(patch: Patch) -> None:
+    """Looks at the clock when it is woken only."""
+    patch.setattr(Election, "leads", lambda self, _now_s: self.office is not None)
+
+
+@_mutant
+def leaves_office_free(patch: Patch) -> None:
+    """Forgets its promise to itself when its lease has ended, although robots may still obey it."""
+    leave = Election._leave_office
+
+    def leave_free(self: Any, reason: str) -> None:
+        leave(self, reason)
+        self._voter.runs_until_s = -math.inf
+
+    patch.setattr(Election, "_leave_office", leave_free)
+
+
+@_mutant
+def obeys_without_a_warrant(patch: Patch) -> None:
+    """Takes an order for fresh that brings back none of its marks."""
+    patch.setattr(Obedience, "_end_s", lambda _self, _warrant: math.inf)
+
+
+@_mutant
+def judges_validity_on_arrival(patch: Patch) -> None:
+    """Obeys for what was left of the lease from when the order arrived."""
+    heed = Obedience.heed
+
+    def heed_from_now(self: Any, reign: Reign, warrant: Warrant, now_s: float) -> Any:
+        self._said_s = dict.fromkeys(self._said_s, now_s)
+        return heed(self, reign, warrant, now_s)
+
+    patch.setattr(Obedience, "heed", heed_from_now)
+
+
+@_mutant
+def obeys_whom_it_has_not_promised(patch: Patch) -> None:
+    """Obeys every leader that shows a warrant, whomever it has promised its vote."""
+    begin = Obedience.__init__
+
+    def begin_free(self: Any, name: str, incarnation: int, lease_s: float, _voter: Any) -> None:
+        begin(self, name, incarnation, lease_s, None)
+
+    patch.setattr(Obedience, "__init__", begin_free)
+
+
+@_mutant
+def ignores_the_sequence(patch: Patch) -> None:
+    """Takes orders of one leader in the order in which they arrive."""
+
+    def take(self: Any, _kind: str, _authority: Authority, reign: Reign, warrant: Warrant, now_s: float) -> Any:
+        return self.heed(reign, warrant, now_s)
+
+    patch.setattr(Obedience, "take", take)
+
+
+@_mutant
+def drives_on_when_it_obeys_nobody(patch: Patch) -> None:
+    """Tells its body to drive as long as patience lasts, whenever obedience may end."""
+    patch.setattr(Allegiance, "obeyed_until_s", property(lambda _self: math.inf))
+
+
+@_mutant
+def begins_two_stages_ahead(patch: Patch) -> None:
+    """Waits for nobody."""
+    patch.setattr(StageFollower, "_keeps_back", lambda _self, _name, _stage: False)
+
+
+@_mutant
+def goes_beyond_what_is_released(patch: Patch) -> None:
+    """Goes on to the end of its way, if nobody keeps it back."""
+    patch.setattr(
+        StageFollower,
+        "_may_begin",
+        lambda self, stage: not any(self._keeps_back(name, stage) for name in self._ways),
+    )
+
+
+@_mutant
+def releases_before_all_have_accepted(patch: Patch) -> None:
+    """Does not wait for robots that have not said that they accept a revision."""
+    patch.setattr(MovementAuthority, "undecided", property(lambda _self: ()))
+
+
+@_mutant
+def releases_links_first(patch: Patch) -> None:
+    """Puts every tree in force when it is proposed."""
+    patch.setattr(Negotiation, "unconfirmed", lambda _self: ())
+
+
+@_mutant
+def trusts_its_predecessor(patch: Patch) -> None:
+    """Takes the links of an earlier reign's tree for confirmed."""
+    patch.setattr(Negotiation, "_confirmed_here", lambda _self, _tree: True)
+
+
+@_mutant
+def takes_a_proposal_for_the_tree(patch: Patch) -> None:
+    """Lets go of its links when others are proposed."""
+    take = HeldTree.take
+
+    def take_it_all(self: Any, word: Topology) -> str:
+        tree: Tree | None = word.committed if word.proposal is None else word.proposal.tree
+        return take(self, structs.replace(word, committed=tree))
+
+    patch.setattr(HeldTree, "take", take_it_all)
+
+
+@_mutant
+def goes_before_the_tree_is_in_force(patch: Patch) -> None:
+    """Releases the motion to another tree while that is being negotiated."""
+    permit = Dispatcher.permit
+    patch.setattr(Dispatcher, "permit", lambda self, _permitted: permit(self, True))
+
+
+@_mutant
+def keeps_proposals_open(patch: Patch) -> None:
+    """Never gives a proposal up."""
+    handle = Negotiation.handle
+
+    def handle_for_ever(self: Any, event: Any, now_s: float) -> Any:
+        if self._open is not None:
+            self._open.opened_s = now_s
+        return handle(self, event, now_s)
+
+    patch.setattr(Negotiation, "handle", handle_for_ever)
+
+
+@_mutant
+def never_stands(patch: Patch) -> None:
+    """Has no patience left to stand for election when a leader is gone."""
+    patch.setattr(Election, "_stands_at_s", property(lambda self: math.inf if self._highest_epoch else 0.0))
+
+
+@_mutant
+def remembers_everything(patch: Patch) -> None:
+    """Never forgets a mark."""
+
+    def mark(self: Any, now_s: float) -> str:
+        self._marks += 1
+        name = f"{self._incarnation}.{self._marks}"
+        self._said_s[name] = now_s
+        return name
+
+    patch.setattr(Obedience, "mark", mark)
+
+
+@_mutant
+def fails_on_a_vanished_peer(patch: Patch) -> None:
+    """A role that raises where it should not."""
+    handle = Robot.handle
+
+    def handle_badly(self: Any, event: Any, now_s: float) -> Any:
+        if type(event).__name__ == "PeerVanished":
+            raise KeyError(event.peer)
+        return handle(self, event, now_s)
+
+    patch.setattr(Robot, "handle", handle_badly)
