@@ -140,6 +140,15 @@ def draw_clocks(chance: Random, voters: Sequence[str]) -> list[Fault]:
     ]
 
 
+def draw_blackout(chance: Random, voters: Sequence[str], at_s: float, for_s: float) -> list[Fault]:
+    """The power fails: what is not on disk is forgotten."""
+    spared = chance.choice((0, 0, 1))
+    return [
+        Kill(at_s=_round(at_s + chance.uniform(0.0, 0.02)), for_s=_round(for_s * chance.uniform(0.5, 1.0)), who=name)
+        for name in chance.sample(voters, len(voters) - spared)
+    ]
+
+
 def draw_fault(chance: Random, voters: Sequence[str], at_s: float, for_s: float, *, loses_disks: bool = False) -> Fault:
     """One fault of any kind."""
     who = LEADER if chance.random() < 0.4 else chance.choice((*voters, "agent"))
