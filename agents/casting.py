@@ -8,12 +8,14 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from agents.allegiance import Allegiance
+from agents.auction import Auctioneer
 from agents.base_station import BaseStation
 from agents.behaviour import begin
 from agents.certificate_judge import certificate_judge
 from agents.collection import Collection
 from agents.driver import DiscDriver
 from agents.leadership import Leadership
+from agents.lot import Lot
 from agents.mind import Mind, Part
 from agents.mission import Mission, RosterEntry
 from agents.planning_job import Answer, Question
@@ -28,7 +30,7 @@ from agents.tracked_agent import TrackedAgent
 from planning.compiled_map import CompiledMap
 from planning.environment import Environment
 from planning.inflation import NothingLeft
-from protocol.messages import Point, Reign
+from protocol.messages import Offer, Point, Reign
 
 if TYPE_CHECKING:
     from agents.leader import DeploymentPlanner
@@ -97,14 +99,21 @@ class Casting:
             robot = body = Robot(mission, entry.name, self._judge, allegiance, orders, now_s)
         else:
             robot, body = None, BaseStation(mission, self._environment, orders, collection, now_s)
-        tree = TeamTree(mission, self._environment, allegiance, orders, collection, robot)
-        planner = _Planner(self.team_planner)
-        leadership = Leadership(mission, allegiance, tree, orders, collection, planner, robot, now_s)
         knowing: list[Part] = [allegiance, orders, collection]
+        estimate = None
         if not mission.announces:
             estimate = SharedEstimate(mission, entry.name, incarnation, self._sight)
             knowing += [estimate, Ranging(mission, entry.name, estimate)]
-        return Mind([*knowing, body, tree, leadership])
+        planner = _Planner(self.team_planner)
+        negotiating: list[Part] = [
+            tree := TeamTree(mission, self._environment, allegiance, orders, collection, robot, estimate)
+        ]
+        auctioneer = None
+        if mission.topology == "auction":
+            auctioneer = Auctioneer(allegiance, planner, mission.base_station.name)
+            negotiating.append(auctioneer)
+        leadership = Leadership(mission, allegiance, tree, orders, collection, planner, auctioneer, robot, now_s)
+        return Mind([*knowing, body, *negotiating, leadership])
 
     @cached_property
     def _sight(self) -> Sight:
@@ -152,7 +161,7 @@ class Casting:
             mission.robot_radius_m,
             mission.decomposition,
             placements=mission.placements,
-            search=mission.search,
+            search="one-edge" if mission.topology == "auction" else mission.search,
             spacing_m=mission.spacing_m,
             base_name=mission.base_station.name,
             agent_name=mission.tracked_agent.name,
@@ -187,6 +196,12 @@ class _Planner:
 
     def prepare(self) -> None:
         self._build()
+
+    def lot(self, question: Question) -> Lot:
+        return self._build().lot(question)
+
+    def bid(self, lot: Lot, bidder: str) -> tuple[Offer, ...]:
+        return self._build().bid(lot, bidder)
 
     def plan(self, question: Question) -> Answer:
         return self._build().plan(question)

@@ -23,6 +23,7 @@ from typing import Final, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from agents.lot import Lot
 from agents.outlook import Outlook
 from agents.proposals import Proposal, Proposer, relays_in_words
 from agents.pursuit import Pursuit
@@ -34,7 +35,7 @@ from planning.deployment import NO_CHAIN, NoChain
 from planning.environment import Environment
 from planning.mutual_visibility import TooManyCells
 from planning.redeployment import Search
-from protocol.messages import Placement, Point
+from protocol.messages import Offer, Placement, Point
 
 Floats = NDArray[np.float64]
 
@@ -152,6 +153,7 @@ class DeploymentPlanner:
         robots: Mapping[str, Point],
         previous: Plan | None,
         obstacles: Sequence[Point] = (),
+        bids: Mapping[str, Sequence[Offer]] | None = None,
     ) -> Plan:
         """Decide where every robot goes.
 
@@ -160,6 +162,8 @@ class DeploymentPlanner:
             robots: where the robots are that can be counted on.
             previous: the plan before.
             obstacles: where robots may stand that cannot be counted on.
+            bids: what was offered in an auction of :meth:`lot`; None: the planner looks for chains itself, as it does
+                if no chain was offered.
 
         Returns:
             A plan that gives each of ``robots`` exactly one place.
@@ -175,9 +179,23 @@ class DeploymentPlanner:
         relays = () if previous is None else tuple(place for place in previous.placements if not place.spare)
         standing = self._standing(agent, robots, relays, previous)
         names = [relay.robot for relay in relays if relay.robot in robots]
-        new = self._proposer.chains(agent, robots, names, obstacles)
+        new = [] if bids is None else self._proposer.award(agent.aims, bids)
+        new = new or self._proposer.chains(agent, robots, names, obstacles)
         chosen = self._best(standing, new or [self._proposer.outward(now, robots, obstacles)], agent, robots)
         return self._complete(chosen, agent, robots, needed, previous, obstacles)
+
+    def lot(
+        self, agent: Whereabouts, robots: Mapping[str, Point], previous: Plan | None, obstacles: Sequence[Point] = ()
+    ) -> Lot:
+        """What can be auctioned before :meth:`plan` is asked the same."""
+        relays = () if previous is None else tuple(place for place in previous.placements if not place.spare)
+        inside = {name: self._inside(place) for name, place in robots.items()}
+        standing = tuple(relay.robot for relay in relays if relay.robot in robots)
+        return Lot(agent.center, agent.aims, inside, standing, tuple(obstacles))
+
+    def bid(self, lot: Lot, bidder: str) -> tuple[Offer, ...]:
+        """What a member of the team offers in an auction (:meth:`agents.proposals.Proposer.offers`)."""
+        return self._proposer.offers(lot, self._base_name, self._agent_name, bidder)
 
     def _unreachable(self, point: Point) -> str:
         """Why no chain leads there; a sentence."""

@@ -14,6 +14,7 @@ from collections.abc import Iterable
 from typing import Final, Protocol
 
 from agents.allegiance import AT_ONCE_S, Allegiance
+from agents.auction import Auctioneer
 from agents.collection import Collection
 from agents.mission import Mission
 from agents.planning_job import Answer, Question
@@ -47,6 +48,7 @@ class Leadership:
         orders: takes the peer's own orders.
         collection: what is known of the others.
         planner: decides on deployments and motions.
+        auctioneer: asks the others before that; None: nobody is asked.
         body: this peer's own, if it is a robot.
         now_s: the present time.
     """
@@ -61,12 +63,14 @@ class Leadership:
         orders: StandingOrders,
         collection: Collection,
         planner: Planner,
+        auctioneer: Auctioneer | None,
         body: Body | None,
         now_s: float,
     ) -> None:
         self._mission, self._allegiance, self._tree, self._orders = mission, allegiance, tree, orders
         self._collection, self._planner, self._body = collection, planner, body
         self._complete_by_s = now_s + GRACE_S
+        self._auctioneer = auctioneer
         self._prepared = False
         self._duty: ReignDuty | None = None
         self._asked: ReignDuty | None = None
@@ -102,6 +106,9 @@ class Leadership:
             duty.lead(now_s)
             if (question := duty.ask(now_s, busy=self._asked is not None)) is not None:
                 self._asked = duty
-                effects.append(Compute(PLANNING, self._planner.plan, (question,)))
+                if self._auctioneer is None:
+                    effects.append(Compute(PLANNING, self._planner.plan, (question,)))
+                else:
+                    effects += self._auctioneer.hold(question, PLANNING)
             effects += duty.collect()
         return effects

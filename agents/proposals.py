@@ -21,24 +21,28 @@ agent on the way may well cost less.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import lru_cache
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
 from itertools import combinations, groupby, pairwise
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from agents.lot import Lot
 from agents.whereabouts import Aim, Whereabouts
 from planning.chain import cheapest_chain
 from planning.deployment import NO_CHAIN, identify_robots
+from planning.own_edges import exchange_own, own_edges
 from planning.placement_graph import PlacementGraph
 from planning.redeployment import Search, redeploy
-from protocol.messages import Placement, Point
+from protocol.messages import Offer, Placement, Point
+from protocol.topology import in_words
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Exchange: TypeAlias = tuple[tuple[int, int] | None, tuple[int, int] | None]
 Bools = NDArray[np.bool_]
 
 METRES_PER_WEIGHT: Final = 3.0
@@ -86,6 +90,8 @@ class Found:
     robots: tuple[int, ...]
     places: tuple[int, ...]
     lower_bound_m: float
+    exchange: Exchange = (None, None)
+    """Edges of the team's tree that a search near to it has exchanged: the one removed, and the one added."""
 
 
 class Proposer:
@@ -133,30 +139,112 @@ class Proposer:
         """
         order = _order(np.array(agent.center), robots, standing)
         tree = _tree(order, standing)
-        drive = np.array([self._graph.distances_from(robots[name]) for name in order]).reshape(
-            len(order), len(self._graph)
-        )
-        drive[:, self._taken(obstacles)] = np.inf
+        drive = self._drives(order, robots, obstacles)
         found = [self._chain(aim, order, drive, self._search, tree) for aim in agent.aims]
         if self._search in ("one-edge", "fixed") and not any(found):
             # The team's tree is too far from one that serves.
             found = [self._chain(aim, order, drive, "chain", tree) for aim in agent.aims]
         return [proposal for proposal in found if proposal is not None]
 
+    def offers(self, lot: Lot, base: str, agent: str, bidder: str) -> tuple[Offer, ...]:
+        """What a bidder has to offer in an auction: for each aim the best chain in which a link of its own is another.
+
+        Own is the link towards the base station, and to the last relay, or the base station without one, that to the
+        agent too: so each link is somebody's, and the least that all offer is what ``"one-edge"`` finds.
+
+        Args:
+            lot: what is auctioned.
+            base: name of the base station.
+            agent: name of the agent.
+            bidder: name of who offers.
+        """
+        order = _order(np.array(lot.center), lot.robots, lot.standing)
+        names = [base, agent, *order]
+        tree = _tree(order, lot.standing)
+        edges = own_edges(tree, BASE)
+        own = [
+            edge
+            for node, edge in edges.items()
+            if names[node] == bidder or (node == AGENT and names[edge[0] + edge[1] - AGENT] == bidder)
+        ]
+        drive = self._drives(order, lot.robots, lot.obstacles)
+        offers = []
+        for number, aim in enumerate(lot.aims):
+            if self._direct(aim) is not None:
+                continue
+            found = self._serve(aim, order, drive, partial(self._find_near, tree=tree, own=own))
+            if found is None:
+                continue
+            proposal, whole, exchange = found
+            removed, added = (None if edge is None else (names[edge[0]], names[edge[1]]) for edge in exchange)
+            offers.append(
+                Offer(
+                    aim=number, whole=whole, total_cost_m=proposal.total_cost_m or 0.0, cost=proposal.cost,
+                    relays=proposal.relays, removed=removed, added=added,
+                )
+            )  # fmt: skip
+        return tuple(offers)
+
+    def award(self, aims: Sequence[Aim], bids: Mapping[str, Sequence[Offer]]) -> list[Proposal]:
+        """The best that was offered for each aim; those that need no relay are nobody's to offer.
+
+        Args:
+            aims: of the auction.
+            bids: by bidder.
+        """
+        won: list[Proposal] = []
+        for number, aim in enumerate(aims):
+            direct = self._direct(aim)
+            offers = [(offer, name) for name, those in bids.items() for offer in those if offer.aim == number]
+            if direct is not None:
+                won.append(direct)
+            elif offers:
+                offer, bidder = min(offers, key=lambda bid: (not bid[0].whole, bid[0].total_cost_m))
+                purpose = aim.whole if offer.whole else aim.part
+                how = "the tree as it is"
+                if offer.removed is not None and offer.added is not None:
+                    how = f"{in_words([offer.added])} for {in_words([offer.removed])}, bid by {bidder}"
+                reason = f"{relays_in_words(len(offer.relays))} {purpose}; {how}"
+                won.append(Proposal(offer.relays, True, reason, offer.cost, offer.total_cost_m))
+        return won
+
+    def _drives(self, order: list[str], robots: Mapping[str, Point], obstacles: Sequence[Point]) -> Floats:
+        """How far it is for each robot to each placement, (k, N) float, metres; inf where nobody can stand."""
+        drive = np.array([self._graph.distances_from(robots[name]) for name in order]).reshape(
+            len(order), len(self._graph)
+        )
+        drive[:, self._taken(obstacles)] = np.inf
+        return drive
+
+    def _direct(self, aim: Aim) -> Proposal | None:
+        """The chain without relays, if the base station sees all of an aim."""
+        direct = self._graph.direct_weights(self._base, aim.places)
+        if not np.isfinite(direct).all():
+            return None
+        weight = float(aim.shares @ direct)
+        cost = METRES_PER_WEIGHT * weight
+        return Proposal((), True, f"no relay needed {aim.whole}", weight, cost, cost)
+
     def _chain(self, aim: Aim, order: list[str], drive: Floats, search: Search, tree: Ints) -> Proposal | None:
         """The cheapest chain for an aim; None if the robots make none."""
-        direct = self._graph.direct_weights(self._base, aim.places)
-        if np.isfinite(direct).all():
-            weight = float(aim.shares @ direct)
-            cost = METRES_PER_WEIGHT * weight
-            return Proposal((), True, f"no relay needed {aim.whole}", weight, cost, cost)
+        direct = self._direct(aim)
+        if direct is not None:
+            return direct
+        found = self._serve(aim, order, drive, partial(self._find, search=search, tree=tree))
+        return None if found is None else found[0]
+
+    def _serve(
+        self, aim: Aim, order: list[str], drive: Floats, find: Callable[[Floats, Floats], Found | None]
+    ) -> tuple[Proposal, bool, Exchange] | None:
+        """The cheapest chain with relays that a search finds for an aim, whether it sees all, and what it exchanges."""
         # The robots have until the agent is there.
         move = drive + LATENESS * np.maximum(0.0, drive - aim.ahead_m * self._speed_ratio)
         weights, share = self._view(aim)
-        for sees, purpose in ((self._graph.sees_all(aim.places), aim.whole), (share > 0.0, aim.part)):
+        kinds = ((True, self._graph.sees_all(aim.places), aim.whole), (False, share > 0.0, aim.part))
+        for whole, sees, purpose in kinds:
             unseen_m = UNSEEN_M * (1.0 - share)
             to_agent = np.where(sees, METRES_PER_WEIGHT * weights + unseen_m, np.inf)
-            found = self._find(move, to_agent, search, tree)
+            found = find(move, to_agent)
             if found is not None:
                 if self._crowded(found.places):
                     continue
@@ -173,7 +261,7 @@ class Proposer:
                 bound_m = total_m if found.lower_bound_m >= total_m * (1.0 - ROUNDING) else found.lower_bound_m
                 seen = "" if share[last] == 1.0 else f", {share[last]:.0%} of that in sight"
                 reason = f"{relays_in_words(len(relays))} {purpose}{seen}"
-                return Proposal(relays, True, reason, cost, total_m, bound_m)
+                return Proposal(relays, True, reason, cost, total_m, bound_m), whole, found.exchange
         return None
 
     def _view(self, aim: Aim) -> tuple[Floats, Floats]:
@@ -192,6 +280,20 @@ class Proposer:
         if search == "chain":
             chain = cheapest_chain(self._links, move, self._from_base, to_agent, RELAY_M)
             return None if chain is None else Found(chain.robots, chain.cells, chain.lower_bound)
+        costs, W = self._as_tree(move, to_agent)
+        found = redeploy(costs, W, search=search, tree=tree, ends=(BASE, AGENT), idle=True)
+        return None if found.tree is None else _read(costs, found.tree, found.cells, float(found.lower_bound))
+
+    def _find_near(self, move: Floats, to_agent: Floats, tree: Ints, own: Collection[tuple[int, int]]) -> Found | None:
+        """The chain of the trees in which one of some edges is another."""
+        costs, W = self._as_tree(move, to_agent)
+        found = exchange_own(costs, W, tree, [BASE, AGENT], own)
+        if np.isinf(found.cost):
+            return None
+        return replace(_read(costs, found.tree, found.cells, 0.0), exchange=(found.removed, found.added))
+
+    def _as_tree(self, move: Floats, to_agent: Floats) -> tuple[Floats, Floats]:
+        """Costs of all nodes and weights of all links, of a tree of base, agent and robots."""
         # Base and agent become two nodes of the tree, in two places of their own.
         places = len(self._links)
         base, agent = places, places + 1
@@ -203,18 +305,7 @@ class Proposer:
         costs = np.full((FIRST_ROBOT + len(move), places + 2), np.inf)
         costs[BASE, base] = costs[AGENT, agent] = 0.0
         costs[FIRST_ROBOT:, :places] = move + RELAY_M
-        found = redeploy(costs, W, search=search, tree=tree, ends=(BASE, AGENT), idle=True)
-        if found.tree is None:
-            return None
-        cells = found.cells
-        # Where several would stand in one place, the one that drives least will do.
-        kept = [
-            (min(nodes, key=lambda node: float(costs[node, cells[node]])), int(place))
-            for place, nodes in groupby(path_between(found.tree), key=lambda node: cells[node])
-        ]
-        return Found(
-            tuple(node - FIRST_ROBOT for node, _ in kept), tuple(place for _, place in kept), float(found.lower_bound)
-        )
+        return costs, W
 
     def relays_needed(self, points: ArrayLike) -> Ints:
         """Fewest relays of a chain to an agent at each of these points (m, 2), metres: (m,) int, NO_CHAIN for none."""
@@ -272,6 +363,16 @@ class Proposer:
         x, y = self._graph.positions[place].tolist()
         cell = int(self._graph.cells[place])
         return Placement(robot=robot, position=(x, y), cell=cell if cell >= 0 else None)
+
+
+def _read(costs: Floats, tree: Ints, cells: Ints, bound_m: float) -> Found:
+    """The chain between base and agent in a tree whose nodes have been placed."""
+    # Where several would stand in one place, the one that drives least will do.
+    kept = [
+        (min(nodes, key=lambda node: float(costs[node, cells[node]])), int(place))
+        for place, nodes in groupby(path_between(tree), key=lambda node: cells[node])
+    ]
+    return Found(tuple(node - FIRST_ROBOT for node, _ in kept), tuple(place for _, place in kept), bound_m)
 
 
 def _order(agent: Floats, robots: Mapping[str, Point], standing: Sequence[str]) -> list[str]:

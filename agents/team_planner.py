@@ -12,13 +12,14 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from agents.assignment import assign
+from agents.lot import Lot
 from agents.motion_planner import Option
 from agents.planning_job import Answer, Question
 from agents.roaming import Roaming
 from agents.whereabouts import Whereabouts, announce
 from planning.foresight import tail
 from planning.reach_in_sight import time_in_sight
-from protocol.messages import Point
+from protocol.messages import Offer, Point
 
 if TYPE_CHECKING:
     from agents.leader import DeploymentPlanner, Plan
@@ -61,7 +62,7 @@ class TeamPlanner:
         agent = self._expect(question)
         robots = {name: place for name, place in onset.places.items() if name != self._motions.base}
         obstacles = [place for lost in question.lost.values() for place in _points(lost)]
-        plan = self._deployments.plan(agent, robots, question.previous, obstacles)
+        plan = self._deployments.plan(agent, robots, question.previous, obstacles, question.bids)
         last = _last_relay(plan)
         watcher = onset.places[self._motions.base if last is None else last]
         in_sight_s = min(LOOKED_AHEAD_S, self._time_in_sight(watcher, question))
@@ -75,6 +76,16 @@ class TeamPlanner:
         except ValueError as problem:
             return Answer(plan, None, str(problem), in_sight_s)
         return Answer(options[course.option], course, in_sight_s=in_sight_s)
+
+    def lot(self, question: Question) -> Lot:
+        """What to auction before the question is answered."""
+        robots = {name: place for name, place in question.onset.places.items() if name != self._motions.base}
+        obstacles = [place for lost in question.lost.values() for place in _points(lost)]
+        return self._deployments.lot(self._expect(question), robots, question.previous, obstacles)
+
+    def bid(self, lot: Lot, bidder: str) -> tuple[Offer, ...]:
+        """What a member of the team offers in an auction."""
+        return self._deployments.bid(lot, bidder)
 
     def _time_in_sight(self, watcher: Point, question: Question) -> float:
         """From the onset on; the agent may have gone anywhere until then."""

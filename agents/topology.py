@@ -10,7 +10,7 @@ Whoever leads asks :meth:`TeamTree.is_in_force` before it lets robots go where a
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, Literal, Protocol
 
@@ -21,6 +21,7 @@ from agents.mission import Mission
 from agents.records import LogLine, TopologyChange
 from agents.role import Compute, Effect, Event, Heard, JobDone, Publish, Record
 from agents.standing_orders import StandingOrders
+from agents.target_set import TargetSet
 from planning.environment import Environment
 from protocol import core
 from protocol.core import Note, Tick, WakeAt
@@ -62,6 +63,13 @@ class Body(Protocol):
         """What it says of itself."""
 
 
+class Estimate(Protocol):
+    """What is needed of the shared estimate of the agent."""
+
+    def target(self, now_s: float) -> TargetSet | None:
+        """Where the agent may be; None: nothing has been measured yet."""
+
+
 @dataclass(frozen=True, slots=True)
 class _Wish:
     """A tree that the leader is about to propose."""
@@ -83,7 +91,7 @@ class TeamTree:
         orders: as this peer has taken them.
         others: where they are.
         body: this peer's own, if it is a robot; the base station stands, and accepts any motion.
-        may_be: where the agent may be, of one that does not announce its way.
+        estimate: of where an agent is that does not announce its way.
     """
 
     hears = frozenset({"topology", "confirmation", "deployment"})
@@ -97,7 +105,7 @@ class TeamTree:
         orders: StandingOrders,
         others: Others,
         body: Body | None = None,
-        may_be: Callable[[float], Sequence[Point]] | None = None,
+        estimate: Estimate | None = None,
     ) -> None:
         self.held = HeldTree(allegiance.name)
         self._name = allegiance.name
@@ -105,7 +113,7 @@ class TeamTree:
         self._starts = {entry.name: entry.start for entry in mission.roster}
         self._voters = (mission.base_station.name, *(robot.name for robot in mission.robots))
         self._environment, self._allegiance, self._orders, self._others = environment, allegiance, orders, others
-        self._body, self._may_be = body, may_be
+        self._body, self._estimate = body, estimate
         self._negotiation = Negotiation(self._voters)
         self._reign: Reign | None = None
         """That the negotiation is of."""
@@ -359,8 +367,9 @@ class TeamTree:
 
     def _agent_places(self, now_s: float) -> Sequence[Point]:
         """Where the agent may be, as far as this peer knows; empty: it does not."""
-        if self._may_be is not None:
-            return self._may_be(now_s)
+        if self._estimate is not None:
+            target = self._estimate.target(now_s)
+            return () if target is None else target.samples
         intent = self._others.intent()
         return () if intent is None else places_on(intent.path or (intent.position,))
 
