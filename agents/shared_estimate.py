@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import Final
 
 import shapely
@@ -28,8 +29,8 @@ from agents.range_message import (
 from agents.records import Estimate
 from agents.rhythm import Rhythm
 from agents.role import Effect, Event, Heard, Publish, Record, Woken
-from agents.sighted_set import Sight, SightedSet, outlines
-from agents.target_set import TargetSet, describe
+from agents.sighted_set import Sight, SightedSet
+from agents.target_set import TargetSet
 from estimation.range_log import TimedRange
 from estimation.shared_ranges import SharedRanges
 from protocol.messages import Point, RangeBase, RangeDigest, Ranges
@@ -94,8 +95,6 @@ class SharedEstimate:
         self._newest_s = -math.inf
         self._said_s = -math.inf
         self._refused = 0
-        self._region: tuple[float, shapely.Geometry] | None = None
-        """The last one asked for, and when it held; None if ranges have come since."""
 
     @property
     def next_s(self) -> float:
@@ -131,42 +130,23 @@ class SharedEstimate:
         """
         self._said_s = max(now_s, self._said_s)
         self._own.append(self._ranges.record(self._said_s, anchor, range_m, bound_m))
-        self._news(self._own)
+        self._newest_s = max(self._newest_s, self._said_s)
         return (Publish(Ranges(ranges=tuple(map(range_to_wire, self._own)))),)
 
     def target(self, now_s: float) -> TargetSet | None:
         """Where the agent may be, as this peer knows; None before it has heard of any range."""
-        region = self._region_at(now_s)
-        return None if region is None else describe(region, now_s, self._newest_s)
+        held = self._ranges.state_at(now_s).tight
+        return replace(self._sight.sketch(held)[1], time_s=now_s, newest_s=self._newest_s) if held.started else None
 
     def contains(self, point: Point, now_s: float) -> bool:
         """Whether the agent may be at a point; anywhere before any range."""
-        region = self._region_at(now_s)
-        return region is None or bool(shapely.dwithin(region, shapely.Point(point), TOLERANCE_M))
+        held = self._ranges.state_at(now_s).tight
+        return not held.started or bool(shapely.dwithin(self._sight.sketch(held)[0], shapely.Point(point), TOLERANCE_M))
 
     @property
     def ranges(self) -> SharedRanges[SightedSet]:
         """The log behind it; to be read."""
         return self._ranges
-
-    def _region_at(self, now_s: float) -> shapely.Geometry | None:
-        """All places of the agent's centre that ranges, sight and walls leave; None before the first range."""
-        if self._region is not None and self._region[0] == now_s:
-            return self._region[1]
-        state = self._ranges.state_at(now_s)
-        if not state.tight.started:
-            return None
-        pieces = outlines(list(state.tight.polygons))
-        region = shapely.union_all(shapely.intersection(pieces, self._sight.ground))
-        if region.is_empty:
-            # Somebody's ranges are wrong. What is left to say is where they point.
-            region = shapely.Point(shapely.get_coordinates(shapely.shortest_line(self._sight.ground, pieces[0]))[0])
-        self._region = (now_s, region)
-        return region
-
-    def _news(self, records: Iterable[TimedRange]) -> None:
-        self._newest_s = max(self._newest_s, *(record.time_s for record in records))
-        self._region = None
 
     def _sum_up(self, now_s: float) -> Iterator[Effect]:
         """Fold, and say which ranges there are."""
@@ -199,7 +179,7 @@ class SharedEstimate:
         self._refused += len(said.ranges) - len(fit)
         self._debts.settle((record.peer, record.number) for record in fit)
         if self._ranges.receive(fit, now_s):
-            self._news(fit)
+            self._newest_s = max(self._newest_s, *(record.time_s for record in fit))
 
     def _compare(self, peer: str, start: int, said: RangeDigest, now_s: float) -> None:
         """Owe a peer what it lacks by its digest."""
@@ -224,7 +204,6 @@ class SharedEstimate:
         self._debts.settle([BASE])
         if self._ranges.adopt(base):
             self._newest_s = max(self._newest_s, base.key[0])
-            self._region = None
 
     def _answer(self, now_s: float) -> Iterator[Effect]:
         """Say what others lack, if it is this peer's turn."""

@@ -16,6 +16,7 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
+from agents.target_set import TargetSet, describe
 from estimation.tight_set import TightSet
 from planning.environment import Environment
 from planning.visible_region import visible_region
@@ -32,6 +33,9 @@ ROUNDING_M: Final = 1e-4
 
 KEPT_STEPS: Final = 256
 """Steps from one set to the next that are kept: the peers of a simulation replay the same ranges one after another."""
+
+KEPT_SKETCHES: Final = 8
+"""Of the sets that have been looked at last: peers of a simulation look at the same one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,11 +73,22 @@ class Sight:
         """Of a place: all that it sees."""
         self.step = lru_cache(maxsize=KEPT_STEPS)(self._step)
         """The set after a step from another, as :meth:`_step` makes it."""
+        self.sketch = lru_cache(maxsize=KEPT_SKETCHES)(self._sketch)
+        """Of a set: all places in free space that it leaves, and what planning and pictures need of them."""
 
     def _region(self, place: Point) -> shapely.Polygon:
         region = visible_region(self.environment, place)
         shapely.prepare(region)
         return region
+
+    def _sketch(self, held: TightSet) -> tuple[shapely.Geometry, TargetSet]:
+        pieces = outlines(list(held.polygons))
+        region = shapely.union_all(shapely.intersection(pieces, self.ground))
+        if region.is_empty:
+            # Somebody's ranges are wrong. What is left to say is where they point.
+            region = shapely.Point(shapely.get_coordinates(shapely.shortest_line(self.ground, pieces[0]))[0])
+        shapely.prepare(region)
+        return region, describe(region)
 
     def _step(self, before: TightSet, step: Move | Seen) -> TightSet:
         """The set after a step. Nobody changes a set that has been made, so that many can go on from it."""

@@ -48,10 +48,15 @@ class TargetSet:
     """Time of the newest range in it."""
 
 
-def describe(region: shapely.Geometry, time_s: float, newest_s: float) -> TargetSet:
+def describe(region: shapely.Geometry, time_s: float = math.nan, newest_s: float = math.nan) -> TargetSet:
     """Samples and outlines of a region that is not empty, metres, map frame.
 
-    Complexity: O(n²) for samples, of which there are some dozens.
+    Args:
+        region: all places where the agent may be.
+        time_s: when; not a number if that is to be filled in.
+        newest_s: as in the set.
+
+    Complexity: O(n²) for n samples, of which there are some dozens.
     """
     simple = shapely.simplify(region, SIMPLER_M)
     outlines = [

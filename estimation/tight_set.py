@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import math
 import threading
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -92,9 +93,6 @@ class _Union:
     annuli: Floats
     """(k, 4) float: x, y, inner and outer radius of those remembered, metres, the oldest first."""
     area: float
-
-    def __deepcopy__(self, memo: object) -> _Union:
-        return self  # nothing of it is ever written to
 
 
 class _Scratch(threading.local):
@@ -183,6 +181,11 @@ class TightSet:
     def __init__(self, outliers: Outliers = "reject") -> None:
         self._rule = make_rule(_Polygons(), outliers)
         self._origin: tuple[float, float] | None = None
+
+    def __deepcopy__(self, memo: object) -> TightSet:
+        twin = copy(self)
+        twin._rule = copy(self._rule)  # what rules hold is replaced, never changed
+        return twin
 
     @property
     def started(self) -> bool:
