@@ -7,6 +7,7 @@ from contextlib import suppress
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+from agents.agent_knowledge import AgentKnowledge
 from agents.allegiance import Allegiance
 from agents.auction import Auctioneer
 from agents.base_station import BaseStation
@@ -112,7 +113,8 @@ class Casting:
         if mission.topology == "auction":
             auctioneer = Auctioneer(allegiance, planner, mission.base_station.name)
             negotiating.append(auctioneer)
-        leadership = Leadership(mission, allegiance, tree, orders, collection, planner, auctioneer, robot, now_s)
+        agent = AgentKnowledge(collection, estimate)
+        leadership = Leadership(mission, allegiance, tree, orders, collection, agent, planner, auctioneer, robot, now_s)
         return Mind([*knowing, body, *negotiating, leadership])
 
     @cached_property

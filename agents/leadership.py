@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final, Protocol
 
+from agents.agent_knowledge import AgentKnowledge
 from agents.allegiance import AT_ONCE_S, Allegiance
 from agents.auction import Auctioneer
 from agents.collection import Collection
@@ -47,6 +48,7 @@ class Leadership:
         tree: negotiates the team's tree.
         orders: takes the peer's own orders.
         collection: what is known of the others.
+        agent: what is known of the agent.
         planner: decides on deployments and motions.
         auctioneer: asks the others before that; None: nobody is asked.
         body: this peer's own, if it is a robot.
@@ -62,13 +64,14 @@ class Leadership:
         tree: TeamTree,
         orders: StandingOrders,
         collection: Collection,
+        agent: AgentKnowledge,
         planner: Planner,
         auctioneer: Auctioneer | None,
         body: Body | None,
         now_s: float,
     ) -> None:
         self._mission, self._allegiance, self._tree, self._orders = mission, allegiance, tree, orders
-        self._collection, self._planner, self._body = collection, planner, body
+        self._collection, self._agent, self._planner, self._body = collection, agent, planner, body
         self._complete_by_s = now_s + GRACE_S
         self._auctioneer = auctioneer
         self._prepared = False
@@ -94,8 +97,8 @@ class Leadership:
             self._duty = None
         elif self._duty is None or self._duty.reign != reign:
             self._duty = ReignDuty(
-                self._mission, reign, self._allegiance, self._tree, self._orders, self._collection, self._body,
-                now_s=now_s, complete_by_s=self._complete_by_s,
+                self._mission, reign, self._allegiance, self._tree, self._orders, self._collection, self._agent,
+                self._body, now_s=now_s, complete_by_s=self._complete_by_s,
             )  # fmt: skip
         duty = self._duty
         if isinstance(event, JobDone) and event.job == PLANNING:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Final, Literal, Protocol
 
 from msgspec import structs
 
+from agents.agent_knowledge import AgentKnowledge
 from agents.allegiance import Allegiance
 from agents.collection import Collection
 from agents.dispatcher import Dispatcher, has_heard
@@ -74,6 +75,7 @@ class ReignDuty:
         tree: negotiates the team's tree.
         orders: takes the peer's own orders; what was taken last says where the team stands.
         collection: what is known of the others.
+        agent: what is known of the agent.
         body: the leader's own, if it is a robot.
         now_s: the present time.
         complete_by_s: until then robots are waited for of which nothing has been heard.
@@ -87,6 +89,7 @@ class ReignDuty:
         tree: TeamTree,
         orders: StandingOrders,
         collection: Collection,
+        agent: AgentKnowledge,
         body: Body | None,
         *,
         now_s: float,
@@ -94,9 +97,8 @@ class ReignDuty:
     ) -> None:
         self.reign = reign
         self._mission, self._allegiance, self._standing, self._body = mission, allegiance, orders, body
-        self._collection, self._tree = collection, tree
+        self._collection, self._agent, self._tree = collection, agent, tree
         self._complete_by_s = complete_by_s
-        self._agent = mission.tracked_agent.name
         self._robots = tuple(robot.name for robot in mission.robots)
         places = {robot.name: collection.whereabouts(robot.name) or (robot.start,) for robot in mission.robots}
         base = mission.base_station
@@ -105,7 +107,7 @@ class ReignDuty:
         told = first_orders(reign.leader) if orders.latest is None else orders.latest
         self._orders = structs.replace(told, authority=self._authority, motion=None)
         """What was said last."""
-        self._plan: Plan | None = plan_of(told, self._agent)
+        self._plan: Plan | None = plan_of(told, mission.tracked_agent.name)
         self._pending: _Pending | None = None
         """The plan whose tree is being negotiated."""
         self._heard: dict[str, State] = {}
@@ -156,9 +158,7 @@ class ReignDuty:
             self._deaf[robot] = self._authority
             self._log("warning", f"{robot} does not answer: the team goes on without it")
             self._lose(robot)
-        intent = self._collection.intent()
-        goal = None if intent is None else (intent.goal,)
-        if goal != self._goal:
+        if (goal := self._agent.goal()) != self._goal:
             self._goal = goal
             self._urgent = True
 
@@ -189,8 +189,10 @@ class ReignDuty:
             busy: whether a question is being worked on, of this reign or one before.
         """
         due = self._replanning.due(now_s) or self._urgent
-        intent = self._collection.intent()
-        if not due or busy or self._pending is not None or intent is None or not self._is_complete(now_s):
+        if not due or busy or self._pending is not None or not self._is_complete(now_s):
+            return None
+        agent = self._agent.look(now_s)
+        if agent is None:
             return None
         onset = self._dispatcher.onset()
         self._urgent = onset is None
@@ -198,7 +200,9 @@ class ReignDuty:
             return None
         self._planning = True
         return Question(
-            way=intent.path or (intent.position,),
+            way=agent.way,
+            target=agent.target,
+            drift_m_s=agent.drift_m_s,
             onset=onset,
             lead_s=self._dispatcher.lead_s,
             previous=self._plan,

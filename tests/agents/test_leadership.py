@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from msgspec import structs
 
+from agents.agent_knowledge import AgentKnowledge
 from agents.base_station import BaseStation
 from agents.collection import Collection
 from agents.dispatcher import PATIENCE_S
@@ -121,7 +122,18 @@ class Team(Life):
         collection = Collection(self.allegiance, "agent")
         body = BaseStation(mission, corner, self.orders, collection, 0.0)
         tree: Any = Agreed()
-        leadership = Leadership(mission, self.allegiance, tree, self.orders, collection, self.oracle, None, 0.0)
+        leadership = Leadership(
+            mission,
+            self.allegiance,
+            tree,
+            self.orders,
+            collection,
+            AgentKnowledge(collection, None),
+            self.oracle,
+            None,
+            None,
+            0.0,
+        )
         super().__init__(Mind([self.orders, collection, body, leadership]), START)
         self.goal: Point | None = None
         self.planning_takes_s = 0.02
