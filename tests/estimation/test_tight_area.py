@@ -107,7 +107,7 @@ def test_the_exact_area_is_that_of_finely_drawn_rings() -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_at_most_a_tenth_too_large(kind: str) -> None:
     ratios = []
-    for seed in range(16):
+    for seed in range(8):
         rng = np.random.default_rng([seed, KINDS.index(kind)])
         epsilon = (0.5, 0.3, 0.1, 0.05)[seed % 4]
         target = rng.uniform(-10, 10, 2)
@@ -125,7 +125,7 @@ def test_at_most_a_tenth_too_large(kind: str) -> None:
                 # Of less than (30 µm)² neither the polygons nor the arcs are right to a tenth.
                 if truth > 1e-9:
                     ratios.append((held.area_m2 / truth, seed, k))
-    assert len(ratios) > 30
+    assert len(ratios) > 15
     # The arcs themselves are right to a thousandth.
     assert min(ratios)[0] > 0.999, min(ratios)
     assert max(ratios)[0] <= 1.1, max(ratios)

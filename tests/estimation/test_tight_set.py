@@ -224,11 +224,11 @@ def test_reports_and_refusals() -> None:
 @pytest.mark.parametrize("outliers", ["reject", "relaxed"])
 def test_five_per_cent_of_corrupt_ranges(outliers: str) -> None:
     lost = []
-    for seed in range(200):
+    for seed in range(120):
         run = Run(seed=seed, robots=1 + seed % 4, corrupt=0.05)
         f = TightSet(outliers=outliers)  # type: ignore[arg-type]
         for step in run.steps():
             f.measure(step.anchor, step.range_m, run.epsilon_m)
         if not f.contains(step.target):
             lost.append(seed)
-    assert len(lost) <= 2, lost
+    assert len(lost) <= 1, lost

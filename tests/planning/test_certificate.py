@@ -243,7 +243,7 @@ def test_receded_walls_enclose_free_space_closely(name: str) -> None:
     assert environment.polygon.buffer(10.1 * depth, join_style="mitre", mitre_limit=20.0).contains(wider)
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(4))
 def test_no_mutant_is_accepted_that_sampling_refutes_and_none_is_refused_without_cause(seed: int) -> None:
     rng = np.random.default_rng(seed)
     name, radius = [("cityblocks", 0.2), ("office", 0.2), ("", 0.12), ("", 0.1)][seed % 4]

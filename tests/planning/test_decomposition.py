@@ -121,7 +121,7 @@ def test_cells_of_hard_polygons_tile_them() -> None:
         except InvalidEnvironment:
             continue
         width = environment.bounds[2] - environment.bounds[0]
-        if len(environment.vertices) < 900:
+        if len(environment.vertices) < 500:
             check_cells(decompose(environment))
         if len(environment.vertices) < 200:
             check_cells(decompose(environment, "aspect", max_bitangent_m=width))
@@ -150,8 +150,9 @@ def test_moved_and_scaled_maps_have_the_same_cells(
     )
 
 
-@pytest.mark.parametrize("pillars", [1, 2, 3, 4])
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    ("pillars", "kind"), [(1, "aspect"), (2, "aspect"), (3, "aspect"), (2, "inflection"), (4, "inflection")]
+)
 def test_a_yard_of_pillars_is_as_symmetric_as_its_cells(pillars: int, kind: Kind) -> None:
     """Many lines through one point, rays from pillar to pillar, bitangents through several vertices."""
     side = 2 * pillars + 1

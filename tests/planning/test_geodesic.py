@@ -60,7 +60,7 @@ def check_against_networkx(environment: Environment, points: Floats) -> None:
 
 @given(seed=st.integers(0, 10_000))
 @example(seed=20265)
-@settings(deadline=None, max_examples=20)
+@settings(deadline=None, max_examples=12)
 def test_random_map_agrees_with_networkx(seed: int) -> None:
     environment = environment_of(seed)
     rng = np.random.default_rng(seed)

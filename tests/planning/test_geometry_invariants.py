@@ -63,8 +63,10 @@ def check_moves(cells: Cells, scale: float, angle: float, shift: float) -> None:
     np.testing.assert_array_equal(mutual_visibility(moved).toarray()[order], mutual_visibility(cells).toarray())
 
 
-@pytest.mark.parametrize("move", MOVES)
-@pytest.mark.parametrize(("name", "kind"), QUICK)
+@pytest.mark.parametrize(
+    ("name", "kind", "move"),
+    [(*drawn, move) for i, drawn in enumerate(QUICK) for j, move in enumerate(MOVES) if (i + j) % 2 == 0],
+)
 def test_cells_and_graphs_of_the_maps_move_with_them(name: str, kind: Kind, move: str) -> None:
     check_moves(decompose(Environment.load(maps.path(name)), kind), *MOVES[move])
 
@@ -170,7 +172,7 @@ def test_points_of_mutually_visible_cells_see_each_other(name: str, kind: Kind) 
     cells = decompose(environment, kind)
     first, second = mutual_visibility(cells).nonzero()
     rng = np.random.default_rng(9)
-    some = rng.integers(0, len(first), 1500)
+    some = rng.integers(0, len(first), 800)
     shares = (rng.dirichlet(np.full(len(cells.polygons[k]), 0.3)) for side in (first, second) for k in side[some])
     named = (k for side in (first, second) for k in side[some])
     drawn = np.array([share @ cells.polygons[k] for share, k in zip(shares, named, strict=True)])

@@ -77,7 +77,7 @@ def test_schedules_keep_robots_apart(seed: int, robots: int) -> None:
     assert certificate.valid, certificate.violations[0].text
 
 
-@settings(max_examples=60)
+@settings(max_examples=35)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_two_robots_find_a_way_where_a_dense_raster_has_one(seed: int) -> None:
     """Robots in one box of pieces no longer than 1 m are nearer to each other than their radii and that."""
@@ -141,7 +141,7 @@ def journeys(seed: int, robots: int) -> tuple[Environment, list[Floats]]:
     return environment, [geodesics.path(start, goal) for start, goal in ends]
 
 
-@settings(max_examples=60)
+@settings(max_examples=35)
 @given(seed=st.integers(0, 400), asked=st.sampled_from(["network", "links", "joined"]))
 def test_schedules_keep_the_sight_that_is_asked_for(seed: int, asked: str) -> None:
     environment, paths = journeys(seed, 3)

@@ -65,12 +65,12 @@ def test_equals_hulls_on_the_maps(name: str, kind: Kind) -> None:
     if n < 100:
         i, j = np.triu_indices(n, 1)
     else:
-        some, visible = rng.integers(0, n, (2, 2000)), np.stack(seen.nonzero())
-        i, j = np.concatenate([some, visible[:, rng.integers(0, visible.shape[1], 1000)]], axis=1)
+        some, visible = rng.integers(0, n, (2, 800)), np.stack(seen.nonzero())
+        i, j = np.concatenate([some, visible[:, rng.integers(0, visible.shape[1], 400)]], axis=1)
     check_pairs(cells, seen, i, j)
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(5))
 def test_equals_hulls_on_random_maps(seed: int) -> None:
     for kind in KINDS:
         cells = decompose(environment_of(seed), kind)

@@ -35,7 +35,7 @@ def equal(first: float, second: float) -> bool:
     return first == second or abs(first - second) <= 1e-9
 
 
-@settings(max_examples=1000)
+@settings(max_examples=400)
 @given(cases())
 def test_exact_is_the_least_of_all_trees_and_placements(case: Case) -> None:
     found = solve(case, "exact", idle=False)
@@ -43,7 +43,7 @@ def test_exact_is_the_least_of_all_trees_and_placements(case: Case) -> None:
     assert found.lower_bound == found.cost
 
 
-@settings(max_examples=500)
+@settings(max_examples=250)
 @given(cases(placements=(1, 6)))
 def test_exact_leaves_out_whom_it_may(case: Case) -> None:
     found = solve(case, "exact", idle=True)
@@ -51,7 +51,7 @@ def test_exact_leaves_out_whom_it_may(case: Case) -> None:
     assert found.lower_bound == found.cost
 
 
-@settings(max_examples=500)
+@settings(max_examples=250)
 @given(cases(), st.booleans())
 def test_fixed_is_the_least_of_all_placements(case: Case, idle: bool) -> None:
     assert equal(solve(case, "fixed", idle).cost, kept_cost(case, case.tree, idle))
@@ -74,7 +74,7 @@ def test_a_chain_is_the_least_of_all_chains_and_of_all_trees_that_may_idle(case:
     assert found.tree is None or (np.bincount(found.tree.ravel()) <= 2).all()
 
 
-@settings(max_examples=300)
+@settings(max_examples=150)
 @given(cases(nodes=(2, 9), placements=(2, 20)), st.booleans())
 def test_a_wider_search_is_not_dearer_and_bounds_hold(case: Case, idle: bool) -> None:
     exact, one_edge, fixed = (solve(case, search, idle) for search in ("exact", "one-edge", "fixed"))
