@@ -69,11 +69,14 @@ class SharedEstimate:
         name: of this peer.
         incarnation: of its process; its ranges count from 0 anew with each.
         sight: of the map.
+        horizon_s: how long ranges are waited for.
     """
 
     hears = frozenset({"ranges", "range_digest", "range_base"})
 
-    def __init__(self, mission: Mission, name: str, incarnation: int, sight: Sight) -> None:
+    def __init__(
+        self, mission: Mission, name: str, incarnation: int, sight: Sight, *, horizon_s: float = HORIZON_S
+    ) -> None:
         self._sight = sight
         self._vetting = Vetting(mission, sight)
         voters = [entry.name for entry in mission.roster if entry.role != "tracked_agent"]
@@ -83,7 +86,7 @@ class SharedEstimate:
             lambda: SightedSet(sight),
             speed_m_s=mission.agent_speed_m_s,
             clock_bound_s=mission.ranging.clock_bound_s,
-            horizon_s=HORIZON_S,
+            horizon_s=horizon_s,
             source=source_of(name, incarnation),
         )
         others = [voter for voter in voters if voter != name]
@@ -136,12 +139,12 @@ class SharedEstimate:
     def target(self, now_s: float) -> TargetSet | None:
         """Where the agent may be, as this peer knows; None before it has heard of any range."""
         held = self._ranges.state_at(now_s).tight
-        return replace(self._sight.sketch(held)[1], time_s=now_s, newest_s=self._newest_s) if held.started else None
+        return replace(self._sight.sketch(held), time_s=now_s, newest_s=self._newest_s) if held.started else None
 
     def contains(self, point: Point, now_s: float) -> bool:
         """Whether the agent may be at a point; anywhere before any range."""
         held = self._ranges.state_at(now_s).tight
-        return not held.started or bool(shapely.dwithin(self._sight.sketch(held)[0], shapely.Point(point), TOLERANCE_M))
+        return not held.started or bool(shapely.dwithin(self._sight.left(held), shapely.Point(point), TOLERANCE_M))
 
     @property
     def ranges(self) -> SharedRanges[SightedSet]:

@@ -16,7 +16,7 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
-from agents.target_set import TargetSet, describe
+from agents.target_set import describe
 from estimation.tight_set import TightSet
 from planning.environment import Environment
 from planning.visible_region import visible_region
@@ -73,22 +73,24 @@ class Sight:
         """Of a place: all that it sees."""
         self.step = lru_cache(maxsize=KEPT_STEPS)(self._step)
         """The set after a step from another, as :meth:`_step` makes it."""
-        self.sketch = lru_cache(maxsize=KEPT_SKETCHES)(self._sketch)
-        """Of a set: all places in free space that it leaves, and what planning and pictures need of them."""
+        self.left = lru_cache(maxsize=KEPT_SKETCHES)(self._left)
+        """Of a set: all places in free space that it leaves; never empty."""
+        self.sketch = lru_cache(maxsize=KEPT_SKETCHES)(lambda held: describe(self.left(held)))
+        """Of a set: what planning and pictures need of these."""
 
     def _region(self, place: Point) -> shapely.Polygon:
         region = visible_region(self.environment, place)
         shapely.prepare(region)
         return region
 
-    def _sketch(self, held: TightSet) -> tuple[shapely.Geometry, TargetSet]:
+    def _left(self, held: TightSet) -> shapely.Geometry:
         pieces = outlines(list(held.polygons))
         region = shapely.union_all(shapely.intersection(pieces, self.ground))
         if region.is_empty:
             # Somebody's ranges are wrong. What is left to say is where they point.
             region = shapely.Point(shapely.get_coordinates(shapely.shortest_line(self.ground, pieces[0]))[0])
         shapely.prepare(region)
-        return region, describe(region)
+        return region
 
     def _step(self, before: TightSet, step: Move | Seen) -> TightSet:
         """The set after a step. Nobody changes a set that has been made, so that many can go on from it."""

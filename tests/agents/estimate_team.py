@@ -16,7 +16,7 @@ from agents.ranging import Transponder
 from agents.records import AnyRecord, Estimate
 from agents.rhythm import Rhythm
 from agents.role import Drive, Effect, Event, Role, Woken
-from agents.shared_estimate import SharedEstimate
+from agents.shared_estimate import HORIZON_S, SharedEstimate
 from agents.sighted_set import Sight
 from launcher.fault_timetable import Fault, Timetable
 from launcher.simulated_peer import SimulatedPeer
@@ -51,19 +51,24 @@ class Stroll:
 class LightCasting:
     """Casts peers that only range and stroll."""
 
-    def __init__(self, mission: Mission) -> None:
-        self._mission = mission
+    def __init__(self, mission: Mission, horizon_s: float = HORIZON_S) -> None:
+        self._mission, self._horizon_s = mission, horizon_s
         self.sight = Sight(CORNER, CORNER.inflated(AGENT_RADIUS_M))
 
     def cast(
-        self, name: str, *, incarnation: int = 0, promise: Reign | None = None, now_s: float = 0.0  # noqa: ARG002
+        self,
+        name: str,
+        *,
+        incarnation: int = 0,
+        promise: Reign | None = None,  # noqa: ARG002 - these have no vote
+        now_s: float = 0.0,
     ) -> tuple[Role, DiscDriver]:
         mission, entry = self._mission, self._mission.entry(name)
         seed = f"{mission.seed}/{name}/{incarnation}"
         if name == "agent":
             body = DiscDriver(entry.start, mission.agent_speed_m_s, self.sight.room)
             return Mind([Stroll(seed, mission.agent_speed_m_s, now_s), Transponder(mission, CORNER)]), body
-        estimate = SharedEstimate(mission, name, incarnation, self.sight)
+        estimate = SharedEstimate(mission, name, incarnation, self.sight, horizon_s=self._horizon_s)
         body = DiscDriver(entry.start, mission.robot_speed_m_s, self.sight.room)
         stroll = Stroll(seed, mission.robot_speed_m_s * (name != "base"), now_s)
         return Mind([stroll, estimate, RangingPart(mission, name, estimate)]), body
@@ -102,9 +107,11 @@ def make_mission(seed: int, **ranging: float) -> Mission:
 class EstimateTeam:
     """The team in virtual time; its invariant is checked as it runs."""
 
-    def __init__(self, seed: int, *faults: Fault, loss: float = 0.0, check_s: float = 0.4, **ranging: float) -> None:
+    def __init__(
+        self, seed: int, *faults: Fault, check_s: float = 0.4, horizon_s: float = HORIZON_S, **ranging: float
+    ) -> None:
         self.mission = make_mission(seed, **ranging)
-        self.casting = LightCasting(self.mission)
+        self.casting = LightCasting(self.mission, horizon_s)
         self.estimates: list[tuple[float, str, Estimate]] = []
         self.escapes: list[str] = []
         self.checks = 0
@@ -114,7 +121,6 @@ class EstimateTeam:
             self.casting,  # type: ignore[arg-type]
             self._record,
             faults=Timetable(faults=faults),
-            loss=loss,
             watch=self._check,
         )
         self.peers = self.team.peers

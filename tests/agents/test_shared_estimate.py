@@ -7,7 +7,7 @@ from msgspec import structs
 
 from agents.range_message import MOST_RANGES
 from agents.role import Heard, Publish, Woken
-from agents.shared_estimate import HORIZON_S, REPEATED, SharedEstimate
+from agents.shared_estimate import REPEATED, SharedEstimate
 from launcher.fault_timetable import Clock, Cut, Delay, Duplicate, Fault, Kill, Loss, Partition, Pause
 from protocol.keys import Address
 from protocol.messages import (
@@ -24,6 +24,9 @@ from protocol.messages import (
     kind_of,
 )
 from tests.agents.estimate_team import VOTERS, EstimateTeam, LightCasting, make_mission
+
+HORIZON_S = 8.0
+"""Ranges are waited for so long here, lest the tests take long."""
 
 BAD_LINKS: tuple[Fault, ...] = (
     Loss(at_s=0.0, share=0.3),
@@ -86,9 +89,14 @@ def test_the_agent_is_inside_every_set_and_all_end_with_the_same(hardship: str, 
 
 def test_who_was_away_for_longer_than_ranges_are_kept_ends_with_the_same_set() -> None:
     """It has to be told the set that is left of them; the others' memory is bounded meanwhile."""
-    away_s = HORIZON_S + 8.0
+    away_s = HORIZON_S + 5.0
     team = EstimateTeam(
-        3, Kill(at_s=2.0, for_s=away_s, who="robot2"), Loss(at_s=0.0, share=0.2), rate_hz=2.0, check_s=2.0
+        3,
+        Kill(at_s=2.0, for_s=away_s, who="robot2"),
+        Loss(at_s=0.0, share=0.2),
+        rate_hz=2.0,
+        check_s=2.0,
+        horizon_s=HORIZON_S,
     )
     team.run_until(2.0 + away_s)
     most = 2.0 * len(VOTERS) * (HORIZON_S + 2.0)
@@ -106,13 +114,13 @@ def test_who_was_away_for_longer_than_ranges_are_kept_ends_with_the_same_set() -
 
 
 def test_the_larger_part_keeps_its_base_when_a_long_partition_heals() -> None:
-    apart_s = HORIZON_S + 8.0
+    apart_s = HORIZON_S + 5.0
     others = ("base", "robot1", "robot3")
     cuts = [
         Cut(at_s=2.0, for_s=apart_s, speakers=speakers, hearers=hearers)
         for speakers, hearers in ((("robot2",), others), (others, ("robot2",)))
     ]
-    team = EstimateTeam(4, *cuts, rate_hz=2.0, check_s=2.0)
+    team = EstimateTeam(4, *cuts, rate_hz=2.0, check_s=2.0, horizon_s=HORIZON_S)
     team.run_until(1.0 + apart_s)
     alone, together = team.estimate("robot2").ranges, team.estimate("base").ranges
     assert alone.folded and together.folded > alone.folded
