@@ -2,17 +2,21 @@
 
 The rules see more than any peer does: true time, all minds, all disks. They are told by what peers say and by what they
 hold to be true; none of them asks the code that they judge whether it did right. Each kind of rule is a class of its
-own: leases and obedience here, orders and motion in :mod:`launcher.order_rules`, trees in :mod:`launcher.tree_rules`.
+own: leases and obedience here, orders and motion in :mod:`launcher.order_rules`, trees in :mod:`launcher.tree_rules`;
+how soon a team recovers is for :mod:`launcher.recovery_rules`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Protocol
+from typing import Final, Protocol
 
+from agents.allegiance import Allegiance
 from agents.mission import Mission
 from agents.shared_estimate import SharedEstimate
+from agents.shell import PeerShell
 from launcher.fault_timetable import Kill, Timetable
+from launcher.kept_memory import count_kept
 from launcher.order_rules import MotionRules, OrderRules
 from launcher.simulated_peer import SimulatedPeer
 from launcher.simulation import SimulatedTeam
@@ -20,10 +24,16 @@ from launcher.tree_rules import TreeRules
 from launcher.violation import Violation
 from protocol.messages import Envelope, Reign, decode
 
-LOOK_S = 1.0
+LOOK_S: Final = 1.0
 """How often it is looked what peers know."""
 
-JUDGED_KINDS = frozenset({"deployment", "topology", "auction", "confirmation", "state", "vote_request"})
+COUNT_S: Final = 5.0
+"""How often it is counted what they keep."""
+
+MOST_KEPT: Final[Mapping[type[object], int]] = {Allegiance: 200, SharedEstimate: 20_000, PeerShell: 30_000}
+"""Things in the containers of a mind's part, and of a whole peer; several times what healthy teams keep."""
+
+JUDGED_KINDS: Final = frozenset({"deployment", "topology", "auction", "confirmation", "state", "vote_request"})
 
 
 class Rules(Protocol):
@@ -56,7 +66,8 @@ class Invariants:
         self._found: Violation | None = None
         for peer in team.peers.values():
             peer.said, peer.watch = self._hear, self._look
-        team.time.call_at(LOOK_S, self._look_at_all)
+        team.time.call_at(LOOK_S, self._look_at_sets)
+        team.time.call_at(COUNT_S, self._look_at_memory)
 
     def _hear(self, peer: SimulatedPeer, key: str, payload: bytes) -> None:
         """Called in the middle of an event, where whatever is raised would count as a failure of the role."""
@@ -76,14 +87,21 @@ class Invariants:
         for rules in self._rules:
             rules.look(peer)
 
-    def _look_at_all(self) -> None:
-        """What costs more."""
+    def _look_at_sets(self) -> None:
         place = self._agent.place
         for peer in self._team.peers.values():
             estimate = peer.part(SharedEstimate)
             if estimate is not None and not estimate.contains(place, peer.now_s):
                 raise Violation("the agent is inside every set", f"it is at {place}, and not for {peer.name}")
-        self._team.time.call_at(self._team.time.now_s + LOOK_S, self._look_at_all)
+        self._team.time.call_at(self._team.time.now_s + LOOK_S, self._look_at_sets)
+
+    def _look_at_memory(self) -> None:
+        for peer in self._team.peers.values():
+            for kind, most in MOST_KEPT.items():
+                part = peer.shell if kind is PeerShell else peer.part(kind)
+                if part is not None and (count := count_kept(part)) > most:
+                    raise Violation("memory is bounded", f"{kind.__name__} of {peer.name} keeps {count} things")
+        self._team.time.call_at(self._team.time.now_s + COUNT_S, self._look_at_memory)
 
 
 class OfficeRules:

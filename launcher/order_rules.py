@@ -8,6 +8,7 @@ from itertools import pairwise
 from typing import Final
 
 from agents.motion_message import end_stage, piece
+from agents.robot import Robot
 from agents.standing_orders import StandingOrders
 from launcher.simulated_peer import SimulatedPeer
 from launcher.violation import Violation
@@ -15,6 +16,9 @@ from protocol.messages import Authority, Deployment, Envelope, MemberWay, Motion
 
 REMEMBERED_S: Final = 30.0
 """Orders are remembered for so long; none can be taken that is older."""
+
+REMEMBERED: Final = 200
+"""Motions."""
 
 OFF_M: Final = 0.02
 """Bodies are no farther than this from their ways."""
@@ -87,6 +91,8 @@ class MotionRules:
         """By epoch, plan and revision, as ordered first."""
         self._released: dict[tuple[int, int], int] = {}
         """The last stage that each plan of an epoch lets anybody begin."""
+        self._settled: dict[tuple[int, int, int], int] = {}
+        """By epoch, plan and revision: the last stage that was released before that."""
         self._progress: dict[str, tuple[int, Progress]] = {}
         """What each robot said last, and its incarnation."""
 
@@ -96,10 +102,15 @@ class MotionRules:
         if isinstance(body, Deployment) and body.motion is not None:
             epoch, motion = body.authority.epoch, body.motion
             self._motions.setdefault((epoch, motion.plan, motion.revision), motion)
-            key = (epoch, motion.plan)
-            self._released[key] = max(self._released.get(key, -1), motion.released)
-            if len(self._motions) > 200:
-                del self._motions[next(iter(self._motions))]
+            key, known = (epoch, motion.plan), (epoch, motion.plan, motion.revision)
+            released = self._released.get(key, motion.first_stage - 1)
+            self._settled.setdefault(known, released)
+            if motion.released > self._settled[known]:
+                self._judge_release(epoch, motion)
+            self._released[key] = max(released, motion.released)
+            if len(self._motions) > REMEMBERED:
+                first = next(iter(self._motions))
+                del self._motions[first], self._settled[first]
         elif isinstance(body, State) and body.progress is not None:
             self._judge(peer, envelope.incarnation, body.progress)
 
@@ -110,6 +121,19 @@ class MotionRules:
         late_s = peer.drives_until_s - peer.clock.when(peer.allegiance.obeyed_until_s)
         if late_s > ROUNDING_S:
             raise Violation("nobody moves who obeys nobody", f"{peer.name} is to drive {late_s:.3f} s longer")
+
+    def _judge_release(self, epoch: int, motion: Motion) -> None:
+        """Whether all robots have accepted a revision of which something is released."""
+        for way in motion.ways:
+            peer = self._peers.get(way.member)
+            if way.scheduled and peer is not None and peer.part(Robot) is not None:
+                _, last = self._progress.get(way.member, (-1, None))
+                accepted = last is not None and (last.epoch, last.plan) == (epoch, motion.plan)
+                if last is None or not accepted or last.revision < motion.revision:
+                    text = (
+                        f"stage {motion.released} of revision {motion.revision}, and {way.member} has not accepted it"
+                    )
+                    raise Violation("nothing is released before all have accepted it", text)
 
     def _judge(self, peer: SimulatedPeer, incarnation: int, progress: Progress) -> None:
         name = peer.name

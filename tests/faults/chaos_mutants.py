@@ -93,8 +93,8 @@ def votes_at_once_after_a_restart(patch: Patch) -> None:
     """Does not rest."""
     begin = Voter.__init__
 
-    def begin_awake(self: Any, promise: Reign | None, lease_s: float, now_s: float) -> None:
-        begin(self, promise, lease_s, now_s)
+    def begin_awake(self: Any, *arguments: Any, **named: Any) -> None:
+        begin(self, *arguments, **named)
         self.rests_until_s = -math.inf
 
     patch.setattr(Voter, "__init__", begin_awake)

@@ -1,0 +1,42 @@
+"""How much a mind keeps: the number of things in all containers that can be reached from it."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping, Set
+from typing import Any, Final
+
+OURS: Final = ("agents.", "protocol.", "estimation.")
+"""Objects of these packages are looked into; maps, arrays and the rest of the world are not the mind's."""
+
+SHARED: Final = ("Mission", "Roster", "Casting", "LightCasting", "_Planner", "TeamPlanner")
+"""Types of what all peers of a simulation have in common."""
+
+
+def count_kept(root: object) -> int:
+    """Number of things in the containers that an object keeps, each container once. O(what it keeps)."""
+    count, seen, ahead = 0, set[int](), [root]
+    while ahead:
+        thing = ahead.pop()
+        if id(thing) in seen:
+            continue
+        seen.add(id(thing))
+        inside = _inside(thing)
+        if isinstance(thing, Mapping | Set | list | tuple | deque):
+            count += len(thing)
+        ahead += [other for other in inside if not isinstance(other, str | bytes | int | float | type(None))]
+    return count
+
+
+def _inside(thing: Any) -> list[Any]:
+    if isinstance(thing, Mapping):
+        return [*thing.keys(), *thing.values()]
+    if isinstance(thing, Set | list | tuple | deque):
+        return list(thing)
+    kind = type(thing)
+    if not kind.__module__.startswith(OURS) or kind.__name__ in SHARED:
+        return []
+    if hasattr(kind, "__struct_fields__"):
+        return [getattr(thing, field) for field in kind.__struct_fields__]
+    slots = [slot for base in kind.__mro__ for slot in getattr(base, "__slots__", ())]
+    return [*getattr(thing, "__dict__", {}).values(), *(getattr(thing, slot, None) for slot in slots)]
