@@ -190,6 +190,7 @@ def _mission(scenario: Scenario, starts: tuple[Point, ...]) -> Mission:
         placements=scenario.planning.placements,
         spacing_m=scenario.planning.spacing_m,
         search=scenario.planning.search,
+        topology=scenario.planning.topology,
         duration_s=scenario.duration_s,
         seed=scenario.seed,
         announces=agent.announces,

@@ -94,6 +94,8 @@ class Planning(_Table, frozen=True, kw_only=True):
     """Kind of cells."""
     search: Literal["chain", "exact", "one-edge", "fixed"] = "chain"
     """How the leader finds chains."""
+    topology: Literal["optimum", "auction"] = "optimum"
+    """Who looks for the next tree: the leader alone, or all by bids for one link of it."""
     period_s: Annotated[float, Meta(ge=0.05, le=86400)] = 0.5
 
 
@@ -283,6 +285,11 @@ def _contradiction(scenario: Scenario) -> str:
             "estimate would lose the agent; make bound_m at least as large"
         )
     planning = scenario.planning
+    if planning.topology == "auction" and planning.search in ("exact", "fixed"):
+        return (
+            f"planning.topology is 'auction' and planning.search is '{planning.search}'; bids are for trees one edge away "
+            "from the team's, remove search"
+        )
     if planning.spacing_m is not None and planning.placements == "cells":
         return "planning.spacing_m is given and planning.placements is 'cells'; only points are on a grid, remove one"
     return ""
