@@ -19,6 +19,7 @@ could go at once, else that on which it holds longest.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, NamedTuple
@@ -57,6 +58,9 @@ GROWTH: Final = 0.2
 
 SLOWER_S: Final = 0.3
 """A motion is good enough if the chain holds that much shorter on it than if all could go at once."""
+
+ARRIVED_M: Final = 1e-6
+"""Who is so near to its goal stands there: where it stopped differs by the rounding of its steps."""
 
 LAXITY_S: Final = 0.3
 """A less strict demand must be worth so many seconds more of a chain that holds."""
@@ -175,7 +179,7 @@ class MotionPlanner:
         # Of a lost robot that has one place it is known exactly how near others may come.
         standing = {name: _point(where[0]) for name, where in lost.items() if len(where) == 1}
         starts = {self.base: onset.places[self.base], **{name: onset.places[name] for name in option.goals}, **standing}
-        goals = {**starts, **option.goals}
+        goals = {name: _goal(option, name, place) for name, place in starts.items()}
         ahead = head(agent.ways[0], FORESIGHT_S * mission.agent_speed_m_s)
         return plan_motion(
             self._environment,
@@ -204,8 +208,8 @@ class MotionPlanner:
         """Everybody's shortest way (m, 2), metres; of one point for those that stand."""
         return {
             name: np.array([place])
-            if option.goals.get(name, place) == place
-            else self.geodesics.path(place, option.goals[name])
+            if (goal := _goal(option, name, place)) == place
+            else self.geodesics.path(place, goal)
             for name, place in onset.places.items()
         }
 
@@ -256,6 +260,12 @@ def _ask(motion: Motion, joined: frozenset[str]) -> Motion:
     if len(joined) > 1:
         return structs.replace(motion, connection="joined", joined=tuple(sorted(joined)))
     return structs.replace(motion, connection="none", joined=())
+
+
+def _goal(option: Option, name: str, place: Point) -> Point:
+    """Where a member goes that is at a place."""
+    x, y = option.goals.get(name, place)
+    return place if math.hypot(x - place[0], y - place[1]) < ARRIVED_M else (x, y)
 
 
 def _point(place: Floats) -> Point:
