@@ -79,6 +79,15 @@ def test_a_motion_is_one_network_with_the_next_moments_of_the_agent() -> None:
     check_certified(motion, HALL, None)
 
 
+def test_a_robot_that_stands_at_its_goal_but_for_rounding_has_nothing_to_drive() -> None:
+    planner, _ = make_planner(HALL)
+    goals = {"robot1": (5.0, 3.0), "robot2": (9.0, 2.0), "robot3": (13.0, 1.0)}
+    onset = stand(BASE, robot1=(5.0, 3.0 + 5e-16), robot2=(9.0, 1.5), robot3=(13.0, 1.0 - 1e-15))
+    course = planner.plan(onset, [Option(goals, ["robot3"])], announce(np.array([(15.0, 2.0)])), {})
+    assert course.arrives
+    assert places_at_last(course.motion)["robot2"] == goals["robot2"]
+
+
 def test_whoever_is_in_the_way_exchanges_places() -> None:
     planner, _ = make_planner(ALLEY, (1.0, 0.35))
     onset = stand((1.0, 0.35), robot1=(3.0, 0.35), robot2=(5.0, 0.35))
