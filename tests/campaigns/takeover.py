@@ -3,9 +3,9 @@
     make takeover
     python -m tests.campaigns.takeover --trials 20 --only kill pause
 
-Runs `sightline run` with timetables of faults, several trials in each run, and reads everything from the recordings. It
-prints a table, and ends with status 1 if a bound was missed or a rule was broken. What else the machine has to do counts:
-it prints the load, and times from a busy machine say little.
+Runs `sightline run` with timetables of faults, several trials in each run, and reads everything from the recordings.
+It prints a table, and ends with status 1 if a bound was missed or a rule was broken. What else the machine has to do
+counts: it prints the load, and times from a busy machine say little.
 """
 
 from __future__ import annotations
@@ -131,7 +131,7 @@ def lose_leaders(outcome: Outcome, run_team: Callable[[Sequence[Fault], float], 
 
 
 def hang_leaders(outcome: Outcome, run_team: Callable[[Sequence[Fault], float], Run], trials: int) -> None:
-    """The leader is paused; how long until all others obey a new one, whom it then follows without a word of its own."""
+    """The leader is paused; how long until all others obey a new one. It goes on, and nobody may obey it again."""
     _take_over(outcome, run_team, [Pause(at_s=0.0, for_s=3.0, who="leader")] * trials, 7.0)
 
 
@@ -266,9 +266,7 @@ def main() -> int:
                     left -= TRIALS_IN_A_RUN
                 outcomes.append(outcome)
         if outcomes:
-            print(
-                "| what | bound: median / worst, s | trials | median, s | 90 %, s | worst, s |\n|---|---|---|---|---|---|"
-            )
+            print("| what | bound, s: median / worst | trials | median, s | 90 %, s | worst, s |\n" + "|---" * 6 + "|")
         for outcome in outcomes:
             print(outcome.row())
             failures += outcome.failures
