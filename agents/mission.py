@@ -93,6 +93,8 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     """Of the grid of points; None: one that suits the map."""
     search: Literal["chain", "exact", "one-edge", "fixed"] = "chain"
     """How the leader finds chains (:mod:`agents.proposals`)."""
+    retreat_after_s: float = 10.0
+    """When robots that nobody has led for so long go back the way that they have come (:mod:`agents.retreat`)."""
     topology: Method = "optimum"
     """Where the trees come from that the leader proposes (:mod:`agents.topology`)."""
     announces: bool = True

@@ -14,6 +14,12 @@ from protocol.messages import Point
 ARRIVED_M = 1e-3
 """Nearer than this, a corner counts as passed and a target as reached."""
 
+PASSED_M = 1e-7
+"""Nearer than this a waypoint of a motion is reached: as exact as certificates are."""
+
+ASTRAY_M = 0.01
+"""Farther than this from its way in a motion a robot stands: nothing is certified of where it is."""
+
 
 class Routes(Protocol):
     """Shortest paths in free space: what is used of :class:`planning.geodesic.GeodesicMap`."""
@@ -36,6 +42,14 @@ class Leg:
 
 
 STANDING = Leg((0.0, 0.0), 0.0)
+
+
+def distance_off(a: Point, b: Point, position: Point) -> float:
+    """Of a place from the straight from ``a`` to ``b``, metres."""
+    dx, dy = b[0] - a[0], b[1] - a[1]
+    along = (position[0] - a[0]) * dx + (position[1] - a[1]) * dy
+    share = min(1.0, max(0.0, along / ((dx * dx + dy * dy) or 1.0)))
+    return math.dist(position, (a[0] + share * dx, a[1] + share * dy))
 
 
 class PathFollower:

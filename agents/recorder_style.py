@@ -18,6 +18,7 @@ MODES = {
     "yielding": 0xB48CFFFF,
     "arrived": 0x5BE08AFF,
     "holding": 0xF5B83DFF,
+    "retreating": 0xFF8C42FF,
 }
 SERIES = {"connected": ["agent visible", "chain", "team"], "cost": ["cost", "lower bound"]}
 

@@ -1,14 +1,16 @@
 """A robot: goes its way in the team's motion, says where it is and how far, and stands when nobody leads.
 
-=========  ====================================================================
-waiting    has heard no order yet
-moving     on its way, in a stage that it may be in
-yielding   stands on its way until others are farther, or more is released
-arrived    stands where its way ends
-holding    was told to, or obeys nobody any more, or cannot follow its orders
-=========  ====================================================================
+==========  ====================================================================
+waiting     has heard no order yet
+moving      on its way, in a stage that it may be in
+yielding    stands on its way until others are farther, or more is released
+arrived     stands where its way ends
+holding     was told to, or obeys nobody any more, or cannot follow its orders
+retreating  goes back the way that it has come, with all others of its motion
+==========  ====================================================================
 
-Standing is safe wherever it is, so whatever is amiss makes it stand, or end what it has accepted before.
+Standing is safe wherever it is, so whatever is amiss makes it stand, or end what it has accepted before. Only when
+nobody has led for long do robots go back (:mod:`agents.retreat`): nearer to where more of the team may be heard.
 """
 
 from __future__ import annotations
@@ -23,11 +25,11 @@ from agents.allegiance import AT_ONCE_S, Allegiance
 from agents.certificate_judge import Judge
 from agents.driver import patience_s
 from agents.mission import Mission
-from agents.path_follower import STANDING, Leg
+from agents.path_follower import ASTRAY_M, STANDING, Leg
 from agents.records import LogLine
 from agents.role import Compute, Drive, Effect, Event, Heard, JobDone, Record, Woken
 from agents.self_report import SelfReport
-from agents.stage_follower import ASTRAY_M, StageFollower
+from agents.stage_follower import StageFollower
 from agents.standing_orders import StandingOrders
 from protocol.messages import Deployment, Mode, Motion, Point, Reign, State
 
@@ -36,6 +38,12 @@ CERTIFICATE: Final = "certificate"
 
 LONG_S: Final = 2.0
 """Whoever yields for longer says to whom."""
+
+SILENCE_S: Final = 1.0
+"""Robots go back only with those that they have heard within so long, or …"""
+
+SILENT_STATES: Final = 5
+"""… within so many states, if that is longer."""
 
 
 class Robot:
@@ -66,6 +74,12 @@ class Robot:
         self._allegiance, self._standing = allegiance, orders
         self._follower = StageFollower(name, mission.robot_speed_m_s)
         self._patience_s = patience_s(mission.control_hz)
+        self._retreat_after_s = mission.retreat_after_s
+        self._silence_s = max(SILENCE_S, SILENT_STATES / mission.control_hz)
+        self._still = (mission.base_station.name,)
+        """Members of motions that never move."""
+        self._without: tuple[str, ...] | None = None
+        """Who kept it from going back when that was said last."""
         self._report = SelfReport(mission, "robot", mission.robot_radius_m, now_s)
         self._wake_s = now_s
         self._mode: Mode = "waiting"
@@ -99,6 +113,8 @@ class Robot:
                 return self._live(now_s, position)
             case Heard(_, envelope) if isinstance(envelope.body, State):
                 progress = envelope.body.progress
+                if self._follower.retreat is not None:
+                    self._follower.retreat.hear(envelope.sender, progress, now_s)
                 if progress is not None and self._follower.hear(envelope.sender, progress) and self._mode == "yielding":
                     self._wake_s = now_s
             case JobDone(job=name) if name == CERTIFICATE:
@@ -116,11 +132,16 @@ class Robot:
     def _live(self, now_s: float, position: Point) -> list[Effect]:
         self._orders, self._followed = self._standing.latest, self._allegiance.followed
         obeys = self._obey(now_s, position)
-        self._leg = self._follower.steer(position) if obeys else STANDING
+        obeyed_s = self._allegiance.obeyed_until_s - now_s
+        if obeys:
+            self._leg = self._follower.steer(position)
+            # However long this mind may hang after it has said so: the body stands when nobody is obeyed any more.
+            drives_s = min(self._patience_s, max(0.0, obeyed_s))
+        else:
+            self._leg = self._go_back(now_s, position) if -obeyed_s >= self._retreat_after_s else STANDING
+            drives_s = self._patience_s
         self._settle_mode(obeys, now_s)
-        # However long this mind may hang after it has said so: the body stands when nobody is obeyed any more.
-        obeyed_s = max(0.0, self._allegiance.obeyed_until_s - now_s)
-        self._effects.append(Drive(self._leg.velocity, min(self._leg.lasts_s, self._patience_s, obeyed_s)))
+        self._effects.append(Drive(self._leg.velocity, min(self._leg.lasts_s, drives_s)))
         self.state = State(
             position=position,
             velocity=self._leg.velocity,
@@ -153,6 +174,26 @@ class Robot:
             self._consider(orders.authority.epoch, orders.motion, position)
         progress = self._follower.progress
         return progress is not None and progress.epoch == orders.authority.epoch
+
+    def _go_back(self, now_s: float, position: Point) -> Leg:
+        """The leg to drive when nobody has been obeyed for long."""
+        if self._follower.retreat is None:
+            self._without = None
+            self._follower.turn_back(self._still, position, self._silence_s)
+        retreat = self._follower.retreat
+        if retreat is None:
+            return STANDING
+        leg, missing = retreat.steer(position, now_s), retreat.missing(now_s)
+        if missing != self._without:
+            self._without = missing
+            if retreat.alone:
+                does = "stands, as it has nobody to go back with"
+            elif missing:
+                does = f"goes back with all that it moved with, and stands as {', '.join(missing)} cannot be counted on"
+            else:
+                does = "goes back with all that it moved with"
+            self._log("warning", f"nobody has led for {self._retreat_after_s:g} s: {does}")
+        return leg
 
     def _halt(self, why: str) -> None:
         if self._follower.progress is not None:
@@ -208,7 +249,7 @@ class Robot:
     def _settle_mode(self, obeys: bool, now_s: float) -> None:
         before = self._mode
         if self._leg != STANDING:
-            self._mode = "moving"
+            self._mode = "moving" if obeys else "retreating"
         elif self._orders is None:
             self._mode = "waiting"
         elif not obeys or self._refusing:

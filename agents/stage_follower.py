@@ -13,17 +13,13 @@ Who has no motion in a stage is where it ends before it begins, and is not waite
 from __future__ import annotations
 
 import math
-from typing import Final
+from collections import deque
+from collections.abc import Collection
 
 from agents.motion_message import InvalidMotion, check, end_stage, piece
-from agents.path_follower import STANDING, Leg
+from agents.path_follower import ASTRAY_M, PASSED_M, STANDING, Leg, distance_off
+from agents.retreat import MEMORY, Retreat
 from protocol.messages import MemberWay, Motion, Point, Progress
-
-PASSED_M: Final = 1e-7
-"""Nearer than this a waypoint is reached: as exact as certificates are."""
-
-ASTRAY_M: Final = 0.01
-"""Farther than this from its way a robot stands: nothing is certified of where it is."""
 
 
 class StageFollower:
@@ -52,6 +48,10 @@ class StageFollower:
         self._others_finished = 0
         """What the leader says that all have finished."""
         self._heard: dict[str, Progress] = {}
+        self._behind: deque[tuple[Point, ...]] = deque(maxlen=MEMORY)
+        """Its way through each stage that it has finished in this plan, backwards; the latest first."""
+        self.retreat: Retreat | None = None
+        """Its way back, once it has turned; until the plan is forgotten."""
 
     @property
     def progress(self) -> Progress | None:
@@ -59,22 +59,28 @@ class StageFollower:
         if self._motion is None:
             return None
         epoch, plan = self._plan
-        return Progress(epoch=epoch, plan=plan, revision=self._motion.revision, finished=self._finished)
+        back = None if self.retreat is None else self.retreat.stage
+        return Progress(epoch=epoch, plan=plan, revision=self._motion.revision, finished=self._finished, retreat=back)
 
     @property
     def arrived(self) -> bool:
         """Whether all stages that it knows of are finished."""
-        return self._motion is not None and self._finished == end_stage(self._motion)
+        return self._motion is not None and self.retreat is None and self._finished == end_stage(self._motion)
 
     @property
     def target(self) -> Point | None:
         """Where its way ends; None without a plan."""
-        return None if self._motion is None else self._ways[self._name].waypoints[-1]
+        if self._motion is None:
+            return None
+        ahead = self._ways[self._name].waypoints if self.retreat is None else self.retreat.ahead
+        return ahead[-1] if ahead else None
 
     def remaining(self, position: Point) -> tuple[Point, ...]:
         """What is left of its way, from ``position`` on; empty if nothing is."""
         if self._motion is None:
             return ()
+        if self.retreat is not None:
+            return (position, *self.retreat.ahead)
         way = self._ways[self._name]
         ahead = way.waypoints[way.stages[self._finished - self._motion.first_stage] + 1 + self._passed :]
         return (position, *ahead) if ahead else ()
@@ -82,12 +88,43 @@ class StageFollower:
     def has(self, epoch: int, motion: Motion) -> bool:
         """Whether this is what it follows already, in this or an earlier or later repetition."""
         return (
-            self._motion is not None and (epoch, motion.plan) == self._plan and motion.revision == self._motion.revision
+            self._motion is not None
+            and self.retreat is None
+            and (epoch, motion.plan) == self._plan
+            and motion.revision == self._motion.revision
         )
 
     def halt(self) -> None:
         """Forget the plan: it stands until it accepts a new one, which it may from now on."""
-        self._motion, self._halted = None, True
+        self._motion, self.retreat, self._halted = None, None, True
+
+    def turn_back(self, still: Collection[str], position: Point, silence_s: float) -> None:
+        """Go forward no more in this plan; :attr:`retreat` is the way back. Who is off its way, or has no plan, stays.
+
+        Args:
+            still: members of the motion that never move.
+            position: where it is.
+            silence_s: who is not heard for so long is not there.
+        """
+        if self._motion is None or self.retreat is not None or self.astray_m(position) > ASTRAY_M:
+            return
+        way, stage = self._ways[self._name], self._finished - self._motion.first_stage
+        passed: tuple[Point, ...] = ()
+        if stage < len(way.stages) - 1:
+            passed = piece(way, stage)[: self._passed + 1]
+        pieces = list(self._behind)
+        begun = len(passed) > 1 or (passed and math.dist(position, passed[0]) >= PASSED_M)
+        if begun:
+            pieces.insert(0, passed[::-1])
+        self.retreat = Retreat(
+            self._plan,
+            {other.member for other in self._motion.ways if other.scheduled} - {self._name, *still},
+            stage=self._finished + bool(begun),
+            pieces=pieces,
+            position=position,
+            speed_m_s=min(self._speed_m_s, way.speed_m_s),
+            silence_s=silence_s,
+        )
 
     def takes_part(self, motion: Motion) -> bool:
         """Whether a motion has a way for this robot, and others wait for it."""
@@ -108,6 +145,8 @@ class StageFollower:
                 return objection
             off_m = math.dist(position, way.waypoints[0])
         else:
+            if self.retreat is not None:
+                return f"{self._name} has turned back in this plan"
             if objection := self._object_to_revision(self._motion, motion):
                 return objection
             stage = self._finished - motion.first_stage
@@ -123,6 +162,8 @@ class StageFollower:
         if self._motion is None or (epoch, motion.plan) != self._plan:
             self._plan, self._halted = (epoch, motion.plan), False
             self._finished = self._passed = self._others_finished = 0
+            self._behind.clear()
+            self.retreat = None
             self._released = -1
         self._motion = motion
         self.release(motion)
@@ -143,10 +184,13 @@ class StageFollower:
 
     def steer(self, position: Point) -> Leg:
         """The leg to drive from here, which does not go beyond the stage that may be under way. O(k) a stage."""
+        if self.retreat is not None:
+            return STANDING
         while self._motion is not None and not self.arrived and self._may_begin(self._finished):
             way, stage = self._ways[self._name], self._finished - self._motion.first_stage
             ahead = piece(way, stage)[1 + self._passed :]
             if not ahead:
+                self._behind.appendleft(piece(way, stage)[::-1])
                 self._finished, self._passed = self._finished + 1, 0
                 continue
             distance_m = math.dist(position, ahead[0])
@@ -169,7 +213,7 @@ class StageFollower:
 
     def waits_for(self) -> tuple[str, ...]:
         """Members that must finish a stage before it goes on; empty if it waits for a release, or not at all."""
-        if self._motion is None or self.arrived or self._finished > self._released:
+        if self._motion is None or self.retreat or self.arrived or self._finished > self._released:
             return ()
         return tuple(name for name in self._ways if self._keeps_back(name, self._finished))
 
@@ -222,10 +266,5 @@ def _distance_off(way: MemberWay, stage: int, passed: int, position: Point) -> f
     """Of a place from the straight to the next waypoint: of a stage, counted from the first one contained."""
     if stage == len(way.stages) - 1:
         return math.dist(position, way.waypoints[-1])
-    (ax, ay), *ahead = piece(way, stage)[passed:]
-    if not ahead:
-        return math.dist(position, (ax, ay))
-    dx, dy = ahead[0][0] - ax, ahead[0][1] - ay
-    along = (position[0] - ax) * dx + (position[1] - ay) * dy
-    share = min(1.0, max(0.0, along / ((dx * dx + dy * dy) or 1.0)))
-    return math.dist(position, (ax + share * dx, ay + share * dy))
+    place, *ahead = piece(way, stage)[passed:]
+    return distance_off(place, ahead[0] if ahead else place, position)

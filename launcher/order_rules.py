@@ -79,7 +79,7 @@ class OrderRules:
 
 
 class MotionRules:
-    """Robots go where and as far as was ordered, never ahead of each other, and only while they obey.
+    """Robots go where and as far as was ordered, never ahead of each other, and only while they obey, or back together.
 
     Args:
         peers: of the team, by name.
@@ -115,8 +115,12 @@ class MotionRules:
             self._judge(peer, envelope.incarnation, body.progress)
 
     def look(self, peer: SimulatedPeer) -> None:
-        """No body moves for longer than its mind obeys."""
+        """No body moves for longer than its mind obeys, but back."""
         if peer.allegiance is None or peer.drives_until_s <= peer.true_s:
+            return
+        _, progress = self._progress.get(peer.name, (-1, None))
+        if progress is not None and progress.retreat is not None:
+            self._judge_retreat(peer.name, progress, progress.retreat)
             return
         late_s = peer.drives_until_s - peer.clock.when(peer.allegiance.obeyed_until_s)
         if late_s > ROUNDING_S:
@@ -147,7 +151,20 @@ class MotionRules:
         way = next((way for way in motion.ways if way.member == name), None)
         if way is None:
             raise Violation("motions accepted are one's own", f"{name} has no way in {_steps(progress)}")
-        self._judge_place(peer, way, motion, progress)
+        if progress.retreat is None:
+            self._judge_place(peer, way, motion, progress)
+
+    def _judge_retreat(self, name: str, progress: Progress, stage: int) -> None:
+        """Whether all that were in the motion have turned, and none has more than a stage left to come back through."""
+        motion = self._motions.get((progress.epoch, progress.plan, progress.revision))
+        for way in () if motion is None else motion.ways:
+            _, known = self._progress.get(way.member, (-1, None))
+            if way.scheduled and known is not None and way.member != name:
+                if (known.epoch, known.plan) == (progress.epoch, progress.plan) and known.retreat is None:
+                    raise Violation("nobody goes back before all have turned", f"{name} before {way.member}")
+                if known.retreat is not None and known.retreat > stage + 1:
+                    text = f"{name} goes back before stage {stage}, {way.member} has come back to {known.retreat}"
+                    raise Violation("nobody goes back ahead of those who are farther", text)
 
     def _judge_place(self, peer: SimulatedPeer, way: MemberWay, motion: Motion, progress: Progress) -> None:
         """Whether the body is where its progress lets it be."""

@@ -191,6 +191,7 @@ def _mission(scenario: Scenario, starts: tuple[Point, ...]) -> Mission:
         spacing_m=scenario.planning.spacing_m,
         search=scenario.planning.search,
         topology=scenario.planning.topology,
+        retreat_after_s=scenario.planning.retreat_after_s,
         duration_s=scenario.duration_s,
         seed=scenario.seed,
         announces=agent.announces,

@@ -96,6 +96,8 @@ class Planning(_Table, frozen=True, kw_only=True):
     """How the leader finds chains."""
     topology: Literal["optimum", "auction"] = "optimum"
     """Who looks for the next tree: the leader alone, or all by bids for one link of it."""
+    retreat_after_s: Annotated[float, Meta(ge=5, le=86400)] = 10.0
+    """Robots that nobody has led for so long go back the way that they have come, all together or none."""
     period_s: Annotated[float, Meta(ge=0.05, le=86400)] = 0.5
 
 

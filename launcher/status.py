@@ -13,6 +13,7 @@ _COLOURS = {
     "moving": "cyan",
     "arrived": "green",
     "yielding": "blue",
+    "retreating": "magenta",
     "holding": "yellow",
     "lost": "red",
     "starting": "dim",

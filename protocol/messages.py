@@ -52,9 +52,9 @@ Extent: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=1e7)]
 RoleName: TypeAlias = Literal["base_station", "robot", "tracked_agent"]
 """What a peer is."""
 
-Mode: TypeAlias = Literal["waiting", "moving", "yielding", "arrived", "holding"]
-"""What a peer's body does: it has no orders yet, drives, lets others go first, stands where it should, or stands since
-it was told to or has no order that it can follow."""
+Mode: TypeAlias = Literal["waiting", "moving", "yielding", "arrived", "holding", "retreating"]
+"""What a peer's body does: it has no orders yet, drives, lets others go first, stands where it should, stands since
+it was told to or has no order that it can follow, or goes back the way that it has come since nobody leads."""
 
 Edge: TypeAlias = tuple[Name, Name]
 """A link of a tree between two members, in either order."""
@@ -148,6 +148,9 @@ class Progress(msgspec.Struct, frozen=True, kw_only=True):
     """Of the motion that it has accepted: it knows no other stages."""
     finished: Count
     """Number of stages of the plan that it has finished: all below this one."""
+    retreat: Count | None = None
+    """Nobody leads, and it has turned back: it is not beyond the beginning of this stage, and goes forward no more in
+    this plan. None of a robot that has not turned."""
 
 
 class MemberWay(msgspec.Struct, frozen=True, kw_only=True):
