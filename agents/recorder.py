@@ -69,6 +69,7 @@ from agents.records import (
     Mishap,
     Ordered,
     Planned,
+    TopologyChange,
     Track,
     in_words,
 )
@@ -199,6 +200,11 @@ class RerunRecorder:
             case Estimate():
                 first = self._roles.get(peer) == "base_station"
                 draw_estimate(self._file, now_ns, peer, record, base_station=first)
+            case TopologyChange():
+                what = "is in force" if record.committed else "is given up"
+                said = f"{peer}: tree {record.number[0]}.{record.number[1]} {what}: {record.reason}"
+                level = rr.TextLogLevel.INFO if record.committed else rr.TextLogLevel.WARN
+                self._log(f"log/{peer}", rr.TextLog(said, level=level))
             case LogLine():
                 self._log(f"log/{peer}", rr.TextLog(f"{peer}: {record.text}", level=_LEVELS[record.level]))
         self._file.flush(now=isinstance(record, Decision | LogLine | Mishap))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.mission import Mission
-from agents.records import AnyRecord, Decision, Estimate, LogLine, Ordered, Planned, Track
+from agents.records import AnyRecord, Decision, Estimate, LogLine, Ordered, Planned, TopologyChange, Track
 from protocol.messages import RoleName
 
 Floats = NDArray[np.float64]
@@ -40,6 +40,8 @@ class MissionTrace:
     planned: tuple[Planned, ...]
     """All planning jobs."""
     motions: tuple[tuple[float, Ordered], ...]
+    trees: tuple[tuple[float, str, TopologyChange], ...]
+    """Proposals for another tree when they were settled, with their leaders."""
     estimates: tuple[tuple[float, str, Estimate], ...]
     """Where which peer took an independent agent to be."""
     logs: tuple[tuple[float, str, LogLine], ...]
@@ -77,6 +79,7 @@ class MissionTrace:
             decisions=tuple((time_s, record) for time_s, _, record in ordered if isinstance(record, Decision)),
             planned=tuple(record for _, _, record in ordered if isinstance(record, Planned)),
             motions=tuple((time_s, record) for time_s, _, record in ordered if isinstance(record, Ordered)),
+            trees=tuple((time_s, peer, record) for time_s, peer, record in ordered if isinstance(record, TopologyChange)),
             estimates=tuple((time_s, peer, record) for time_s, peer, record in ordered if isinstance(record, Estimate)),
             logs=tuple((time_s, peer, record) for time_s, peer, record in ordered if isinstance(record, LogLine)),
             agent=mission.tracked_agent.name,

@@ -18,6 +18,7 @@ from agents.self_report import silence_s
 from launcher.contacts import Overlap, find_overlaps
 from launcher.mission_trace import MissionTrace, Trail
 from launcher.report_estimate import EstimateFigures, failures_of, measure_estimates
+from launcher.report_trees import SettledProposal, settled_proposals
 from launcher.wording import counted
 from planning.environment import Environment
 
@@ -90,6 +91,8 @@ class Metrics(msgspec.Struct, frozen=True, kw_only=True):
     planning: PlanningTimes | None
     decisions: int
     topology_changes: tuple[TopologyChange, ...]
+    trees: tuple[SettledProposal, ...]
+    """What was negotiated, as the leaders recorded it."""
     plans: int
     """Of motion: each but the first began because a robot was lost or heard anew, or did not follow the one before."""
     motions: int
@@ -159,6 +162,7 @@ def measure(trace: MissionTrace, environment: Environment) -> Metrics:
             for time_s, decision in trace.decisions
             if decision.topology_changed
         ),
+        trees=settled_proposals(trace),
         plans=len({(ordered.epoch, ordered.motion.plan) for _, ordered in trace.motions}),
         motions=len(trace.motions),
         certified=_certified(trace),

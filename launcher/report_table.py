@@ -8,6 +8,7 @@ from rich.table import Table
 from launcher.contacts import Overlap
 from launcher.report import Metrics, Shares
 from launcher.report_estimate import EstimateFigures
+from launcher.report_trees import describe_trees, tabulate_trees
 from launcher.wording import counted
 
 
@@ -47,6 +48,7 @@ def render(metrics: Metrics) -> Group:
             f"95 % within {1e3 * planning.p95_s:.1f} ms, longest {1e3 * planning.max_s:.1f} ms",
         ),
         ("decisions", f"{metrics.decisions}, {len(metrics.topology_changes)} of them changed the topology"),
+        ("tree", describe_trees(metrics.trees)),
         ("motion", _describe_motion(metrics)),
         *_describe_estimate(metrics.estimate),
         ("overlapping robots", _describe_contacts(metrics.overlaps)),
@@ -61,6 +63,8 @@ def render(metrics: Metrics) -> Group:
             costs = (_metres(change.total_cost_m), _metres(change.lower_bound_m))
             changes.add_row(f"{change.time_s:.2f} s", str(change.decision), change.reason, *costs)
         parts.append(changes)
+    if metrics.trees:
+        parts.append(tabulate_trees(metrics.trees))
     return Group(*parts)
 
 

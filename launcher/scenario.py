@@ -289,8 +289,8 @@ def _contradiction(scenario: Scenario) -> str:
     planning = scenario.planning
     if planning.topology == "auction" and planning.search in ("exact", "fixed"):
         return (
-            f"planning.topology is 'auction' and planning.search is '{planning.search}'; bids are for trees one edge away "
-            "from the team's, remove search"
+            f"planning.topology is 'auction' and planning.search is '{planning.search}'; bids are for trees one edge "
+            "away from the team's, remove search"
         )
     if planning.spacing_m is not None and planning.placements == "cells":
         return "planning.spacing_m is given and planning.placements is 'cells'; only points are on a grid, remove one"
