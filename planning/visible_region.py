@@ -18,7 +18,8 @@ def visible_region(environment: Environment, place: tuple[float, float]) -> shap
 
     Between the directions of two neighbouring vertices one wall, the nearest, bounds the sight. So the directions of
     all vertices are sorted, the wall that the middle direction of each sector meets first is found, and the ends of the
-    sector on that wall are corners of the region. Sight along a wall, a region without area, is left out.
+    sector on that wall are corners of the region; where there is nothing to be seen, the place itself is one. Sight
+    along a wall, a region without area, is left out.
 
     Args:
         environment: the walls.
@@ -36,17 +37,27 @@ def visible_region(environment: Environment, place: tuple[float, float]) -> shap
     middles = 0.5 * (angles + ends)
     reach = _reach(middles, begins, along)
     nearest = np.argmin(reach, axis=1)
-    sees = np.isfinite(reach[np.arange(len(middles)), nearest]) & (ends - angles > _NARROW)
+    far = reach[np.arange(len(middles)), nearest]
+    wide = ends - angles > _NARROW
+    sees = wide & np.isfinite(far)
+    # From a place on a wall some directions lead into it.
+    halfway = 0.5 * far[sees, None] * np.stack([np.cos(middles[sees]), np.sin(middles[sees])], axis=1)
+    sees[sees] = environment.contains(halfway + place)
     if not sees.any():
         return shapely.Polygon()
-    nearest, sides = nearest[sees], np.stack([angles[sees], ends[sees]], axis=1)
-    corners = _meet(sides, begins[nearest], along[nearest]).reshape(-1, 2) + place
+    corners = np.zeros((len(angles), 2, 2))
+    seen = nearest[sees]
+    corners[sees] = _meet(np.stack([angles[sees], ends[sees]], axis=1), begins[seen], along[seen])
+    corners = corners[wide].reshape(-1, 2) + place
     region = shapely.Polygon(corners)
     return region if region.is_valid else shapely.buffer(region, 0.0)
 
 
 _NARROW = 1e-12
 """Radians; a sector no wider shows nothing."""
+
+_TOUCHING_M = 1e-12
+"""A wall no farther is one that the place is on."""
 
 
 def _reach(angles: Floats, begins: Floats, along: Floats) -> Floats:
@@ -56,7 +67,7 @@ def _reach(angles: Floats, begins: Floats, along: Floats) -> Floats:
         across = u * along[:, 1] - v * along[:, 0]
         far = (begins[:, 0] * along[:, 1] - begins[:, 1] * along[:, 0]) / across
         share = (begins[:, 0] * v - begins[:, 1] * u) / across
-    met = (far > 0.0) & (share >= 0.0) & (share <= 1.0)
+    met = (far > _TOUCHING_M) & (share >= 0.0) & (share <= 1.0)
     return np.where(met, far, math.inf)
 
 

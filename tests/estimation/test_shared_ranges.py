@@ -359,3 +359,68 @@ def inside(snapshot, point):
     filter_ = RangeFilter()
     filter_.restore(snapshot.held)
     return bool(filter_.feasible_set().contains(point))
+
+
+def ranges_of(source, numbers, begin_s=0.0):
+    return [TimedRange(source, number, begin_s + number, (0.0, 0.0), 5.0, 0.5) for number in numbers]
+
+
+def test_a_peer_that_starts_again_counts_its_ranges_anew_under_another_name():
+    before = SharedRanges("ann", ("ann", "bob"), RangeFilter, source="ann.0")
+    after_ = SharedRanges("ann", ("ann", "bob"), RangeFilter, source="ann.1")
+    old = before.record(1.0, (0, 0), 5.0, 0.5)
+    new = after_.record(2.0, (0, 0), 5.0, 0.5)
+    assert (old.peer, old.number, new.peer, new.number) == ("ann.0", 0, "ann.1", 0)
+    bob = SharedRanges("bob", ("ann", "bob"), RangeFilter)
+    assert bob.receive([old, new]) == 2
+    bob.note(after_.digest(3.0))
+    assert bob.fold(3.0) == 0, "the new one has not the old range yet"
+    after_.receive([old])
+    bob.note(after_.digest(4.0))
+    bob.digest(4.0)
+    assert bob.fold(4.0, keep_s=2.5) == 1, "the second is too young"
+    assert bob.fold(4.0) == 1
+
+
+def test_who_is_sent_a_delta_is_told_when_that_is_not_enough():
+    ann, bob = (SharedRanges(name, ("ann", "bob"), RangeFilter, horizon_s=5) for name in ("ann", "bob"))
+    ann.receive(ranges_of("cid", range(20)))
+    assert not ann.needs_base(bob.digest(20.0))
+    ann.fold(20.0)
+    assert ann.needs_base(bob.digest(20.0))
+    bob.receive(ann.delta(bob.digest(20.0)))
+    assert ann.needs_base(bob.digest(20.0))
+    assert bob.adopt(ann.base())
+    assert not ann.needs_base(bob.digest(20.0))
+    assert numbers_of(bob.state_at(20)) == numbers_of(ann.state_at(20))
+    assert bob.fingerprint(21.0) == ann.fingerprint(21.0)
+
+
+def test_of_two_that_each_lack_folded_ranges_the_one_with_more_is_gone_on_from():
+    """And what was folded after its end, by who goes on from it, is kept."""
+    ann, bob = (SharedRanges(name, ("ann", "bob"), RangeFilter, horizon_s=5) for name in ("ann", "bob"))
+    ann.receive(ranges_of("cid", range(20)))
+    bob.receive(ranges_of("dee", range(4), 14.0))
+    ann.fold(18.5)
+    bob.fold(22.0)
+    assert bob.base().key > ann.base().key
+    assert not ann.adopt(bob.base())
+    assert bob.adopt(ann.base())
+    assert not bob.adopt(ann.base())
+    assert [record.key for record in bob.log] == [record.key for record in ranges_of("dee", range(4), 14.0)]
+    ann.receive(bob.delta(ann.digest(23.0)))
+    bob.receive(ann.delta(bob.digest(23.0)))
+    assert numbers_of(ann.state_at(23)) == numbers_of(bob.state_at(23))
+    assert ann.fingerprint(30.0) == bob.fingerprint(30.0) is not None
+
+
+def test_fingerprints_tell_logs_apart_and_survive_folding():
+    ann = SharedRanges("ann", ("ann", "bob"), RangeFilter, horizon_s=5)
+    ann.receive(ranges_of("cid", range(20)))
+    before = [ann.fingerprint(time_s) for time_s in range(21)]
+    assert len(set(before)) == 21
+    assert ann.fold(20.0) == 15
+    assert [ann.fingerprint(time_s) for time_s in range(21)] == [None] * 15 + before[15:]
+    other = SharedRanges("bob", ("ann", "bob"), RangeFilter)
+    other.receive(reversed(ranges_of("cid", range(20))))
+    assert [other.fingerprint(time_s) for time_s in range(21)] == before
