@@ -5,6 +5,7 @@ refuses, or knows nothing of it any more. Then everybody is told to hold; when a
 the next plan begins from there.
 
 A robot that is lost may still go as far as was released; then it stands. Its way until there is in the way of others.
+If all robots of a plan are lost, they may go back together (:mod:`agents.retreat`): so is all their way until there.
 """
 
 from __future__ import annotations
@@ -65,6 +66,8 @@ class Dispatcher:
         self._ended: MovementAuthority | None = None
         """The last one, as long as there is no other."""
         self._heading: Mapping[str, Point] = {}
+        self._adrift: set[str] = set()
+        """Robots that were lost on their way in the last plan."""
         self._plan = 0
         """Number of the present plan, or of the next."""
         self._asked = False
@@ -129,6 +132,7 @@ class Dispatcher:
         self._states[robot] = state
         if before is None:
             del self._lost[robot]
+            self._adrift.discard(robot)
             self._begin_afresh("")
         elif self._authority is not None:
             self._judge(self._authority, robot, before, state, now_s)
@@ -140,6 +144,9 @@ class Dispatcher:
         authority = self._authority or self._ended
         if authority is not None and robot in authority.robots and _plan(state) == (self._epoch, authority.motion.plan):
             way += [place for place in authority.way(robot) if place != state.position]
+            self._adrift.add(robot)
+        elif _turned(state):
+            way += state.path
         self._lost[robot] = np.array(way)
         self._begin_afresh("")
 
@@ -188,6 +195,7 @@ class Dispatcher:
         if known is None:
             self._authority = MovementAuthority(self._epoch, motion, list(course.option.goals))
             self._held = self._ended = None
+            self._adrift.clear()
         else:
             known.revise(motion)
         self._heading = course.option.goals if course.arrives else {}
@@ -199,7 +207,7 @@ class Dispatcher:
         if state.progress is not None and authority.hear(robot, state.progress):
             self._due = True
         ours = (self._epoch, self._plan)
-        if _plan(before) == ours and _plan(state) != ours:
+        if _plan(before) == ours and (_plan(state) != ours or _turned(state)):
             self._begin_afresh(f"{robot} does not follow plan {self._plan} any more")
         elif self._ordered is None or robot not in authority.undecided:
             return
@@ -220,7 +228,15 @@ class Dispatcher:
         self._asked = False
 
     def _settle_lost(self) -> None:
-        """Where others stand no lost robot does: then it is where it was heard last, or elsewhere."""
+        """Where others stand no lost robot does: then it is where it was heard last, or elsewhere.
+
+        Robots go back only if all robots of their plan do; those that are heard stand, and have forgotten it.
+        """
+        ended = self._ended
+        if ended is not None and len(ended.robots) > 1 and self._adrift.issuperset(ended.robots):
+            for name in ended.robots:
+                self._lost[name] = np.vstack([self._lost[name], ended.way_back(name)])
+            self._adrift.clear()
         standing = np.array([state.position for state in self._states.values()]).reshape(-1, 2)
         for name, way in self._lost.items():
             if distance(way, standing) < NEAR * 2 * self._radius_m:
@@ -243,6 +259,11 @@ def _stands(state: State, since: Authority) -> bool:
 
 def _plan(state: State) -> tuple[int, int] | None:
     return None if state.progress is None else (state.progress.epoch, state.progress.plan)
+
+
+def _turned(state: State) -> bool:
+    """Whether a robot goes back, or would."""
+    return state.progress is not None and state.progress.retreat is not None
 
 
 def has_heard(state: State, authority: Authority) -> bool:

@@ -15,6 +15,7 @@ Like a railway's movement authority: robots go no farther than has been released
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import islice, pairwise, takewhile
@@ -23,10 +24,14 @@ from msgspec import structs
 
 from agents.motion_message import end_stage, piece
 from agents.records import Advance
+from agents.retreat import MEMORY
 from protocol.messages import MemberWay, Motion, Point, Progress
 
 SAME_PLACE_M = 1e-9
 """Between where what is kept ends and where the next motion begins."""
+
+REMEMBERED = 4 * MEMORY
+"""Waypoints of each robot's way back; a stage has some four at most, mostly none or one."""
 
 
 class Discontinuity(ValueError):
@@ -90,6 +95,8 @@ class MovementAuthority:
         """The last stage that no revision under discussion changes."""
         self._finished = dict.fromkeys(self.robots, 0)
         self._accepted = dict.fromkeys(self.robots, -1)
+        self._behind = {robot: deque[Point](maxlen=REMEMBERED) for robot in self.robots}
+        """Waypoints of the stages that are not in the motion any more."""
         self._take(motion)
 
     def _take(self, motion: Motion) -> None:
@@ -156,12 +163,14 @@ class MovementAuthority:
     def revise(self, motion: Motion) -> None:
         """Put other stages behind what has been released: a continued motion of the onset, nothing released since."""
         self._settled = self.released
+        self._remember(motion.first_stage)
         self._take(structs.replace(motion, released=self.released))
 
     def prune(self) -> None:
         """Forget the stages that all have finished, but the last one."""
         first = min(self.finished, end_stage(self.motion) - 1)
         if first > self.motion.first_stage:
+            self._remember(first)
             self._take(_cut(self.motion, first, end_stage(self.motion) - 1))
 
     def advance(self) -> Advance:
@@ -174,6 +183,18 @@ class MovementAuthority:
         end = self.released + 1 - self.motion.first_stage
         first = min(max(self._finished[robot] - self.motion.first_stage, 0), end)
         return way.waypoints[way.stages[first] : way.stages[end] + 1]
+
+    def way_back(self, robot: str) -> tuple[Point, ...]:
+        """Where else it may be if all have turned back (:mod:`agents.retreat`): the plan's way up to its stage."""
+        way = next(way for way in self.motion.ways if way.member == robot)
+        stage = min(max(self._finished[robot] - self.motion.first_stage, 0), len(way.stages) - 1)
+        return (*self._behind[robot], *way.waypoints[: way.stages[stage] + 1])
+
+    def _remember(self, first: int) -> None:
+        """Keep, of the stages before ``first``, where robots have been."""
+        for way in self.motion.ways:
+            if way.member in self._behind:
+                self._behind[way.member] += way.waypoints[: way.stages[first - self.motion.first_stage]]
 
     def _clock(self) -> Iterator[tuple[float, float]]:
         """When each stage begins and ends at full speed, seconds from when that of the slowest robot begins.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import groupby
 
 import numpy as np
 import pytest
@@ -206,10 +207,11 @@ def test_whatever_is_lost_or_late_nobody_leaves_what_was_released(first: list, s
     orders: list[Motion] = [authority.motion]
     reports: list[list[Progress]] = [[] for _ in ROBOTS]
     tape: dict[tuple[str, int], tuple[Point, ...]] = {}
+    starts = dict(zip(ROBOTS, START, strict=True))
     released = -1
 
     def note() -> None:
-        """The leader's orders as they stand; what was released before is as it was."""
+        """The leader's orders as they stand; what was released before is as it was, and known for ways back."""
         nonlocal released
         motion = authority.motion
         assert motion.released >= released
@@ -221,6 +223,9 @@ def test_whatever_is_lost_or_late_nobody_leaves_what_was_released(first: list, s
                     )
         released = motion.released
         orders.append(motion)
+        for name, finished in authority.advance().finished.items():
+            been = [place for stage in range(finished) for place in tape[name, stage]] or [starts[name]]
+            assert [place for place, _ in groupby(authority.way_back(name))] == [place for place, _ in groupby(been)]
 
     def go(robot: Robot) -> None:
         place = robot.place
