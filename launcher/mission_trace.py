@@ -79,7 +79,7 @@ class MissionTrace:
             decisions=tuple((time_s, record) for time_s, _, record in ordered if isinstance(record, Decision)),
             planned=tuple(record for _, _, record in ordered if isinstance(record, Planned)),
             motions=tuple((time_s, record) for time_s, _, record in ordered if isinstance(record, Ordered)),
-            trees=tuple((time_s, peer, settled) for time_s, peer, settled in ordered if isinstance(settled, TopologyChange)),
+            trees=tuple((at_s, peer, change) for at_s, peer, change in ordered if isinstance(change, TopologyChange)),
             estimates=tuple((time_s, peer, record) for time_s, peer, record in ordered if isinstance(record, Estimate)),
             logs=tuple((time_s, peer, record) for time_s, peer, record in ordered if isinstance(record, LogLine)),
             agent=mission.tracked_agent.name,
