@@ -58,7 +58,7 @@ def prepare(file: Path, announce: Callable[[str], None]) -> Preparation:
 
     Args:
         file: the scenario.
-        announce: is told beforehand if the numerical kernels have to be compiled, which takes a while.
+        announce: is told beforehand what takes a while, and what a majority is if the team can part into halves.
 
     Raises:
         ScenarioFault: the scenario, or a place in it, does not fit.
@@ -92,6 +92,8 @@ def prepare(file: Path, announce: Callable[[str], None]) -> Preparation:
     except UnfitSpacing as problem:
         raise ScenarioFault(f"{file}: planning.spacing_m: {problem}") from problem
     _rehearse(file, mission, casting)
+    if len(mission.voters.voters) % 2 == 0:
+        announce(f"{mission.voters.describe_majority()}.")
     warnings = (*_check_robots_suffice(file, scenario, planner), *_check_pace(scenario))
     return Preparation(scenario, environment, mission, planner, warnings)
 

@@ -349,3 +349,11 @@ def test_a_taken_port_is_named(write: Write) -> None:
         file = write(GOOD + f"\n[network]\nbase_port = {port - 1}\n")
         with pytest.raises(ScenarioFault, match=rf"network\.base_port: port {port} .*choose another base_port"):
             reserve_endpoints(file, prepared(file))
+
+
+def test_an_even_number_of_voters_is_told_what_a_majority_is(write: Write) -> None:
+    """Base station and robots have a vote each."""
+    for count, told in ((3, True), (4, False)):
+        said: list[str] = []
+        prepare(write(GOOD.replace("count = 3", f"count = {count}")), said.append)
+        assert any(text.startswith("3 of 4 voters make a leader: if the team parts") for text in said) is told
