@@ -27,7 +27,8 @@ def conclude(folder: RunFolder) -> Metrics:
 def measure_run(folder: RunFolder) -> Metrics:
     """Measure a run whose recordings have been merged, and write ``metrics.json``.
 
-    Every motion that was ordered is certified once more, from the recording alone.
+    Every motion that was ordered is certified once more, from the recording alone, and the rules of leading are held
+    against it: one leader at a time, orders in office only, rising epochs, trees that span (:mod:`launcher.reigns`).
 
     Raises:
         ValueError: as above.
@@ -42,6 +43,7 @@ def measure_run(folder: RunFolder) -> Metrics:
         for time_s, ordered in trace.motions
         if (fault := judge(ordered.motion))
     )
-    metrics = structs.replace(metrics, failures=metrics.failures + refuted)
+    faults = trace.reigns.broken
+    metrics = structs.replace(metrics, leading_faults=faults, failures=metrics.failures + refuted + faults)
     folder.metrics_file.write_bytes(json.format(json.encode(metrics), indent=1) + b"\n")
     return metrics

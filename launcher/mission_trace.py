@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from agents.mission import Mission
 from agents.records import AnyRecord, Decision, Estimate, LogLine, Ordered, Planned, TopologyChange, Track
+from launcher.reigns import Reigns, find_reigns
 from protocol.messages import RoleName
 
 Floats = NDArray[np.float64]
@@ -50,6 +51,8 @@ class MissionTrace:
     control_hz: float
     planning_period_s: float
     duration_s: float
+    reigns: Reigns
+    """Who led, and who took over from whom."""
 
     @classmethod
     def of(
@@ -86,4 +89,5 @@ class MissionTrace:
             control_hz=mission.control_hz,
             planning_period_s=mission.planning_period_s,
             duration_s=duration_s,
+            reigns=find_reigns(ordered),
         )

@@ -97,7 +97,7 @@ def find_reigns(records: Sequence[tuple[float, str, AnyRecord]]) -> Reigns:
         obeyed=tuple(obeyed),
         takeovers=tuple(_takeovers(led, obeyed, mishaps, {peer: lives[peer] for peer in voters})),
         mishaps=mishaps,
-        broken=tuple(_broken(led, obeyed, records)),
+        broken=tuple(_broken(led, obeyed, records)) if voters else (),
     )
 
 
@@ -105,19 +105,24 @@ def _spells(peer: str, entries: Sequence[tuple[float, AnyRecord]], what: str) ->
     """For how long a peer led (``what`` is ``leads``), or whom it obeyed (``obeys``)."""
     present: Reign | None = None
     since_s = last_s = 0.0
+    silent_from_s: float | None = None
     incarnation = -1
     for time_s, record in entries:
+        if silent_from_s is None and time_s - last_s > SILENT_S:
+            silent_from_s = last_s  # what comes after may be another process, which has not said so yet
         if isinstance(record, Office):
             reign = record.leads if what == "leads" else record.obeys
             restarted = record.incarnation != incarnation
             if present is not None and (restarted or reign != present):
                 ended_s = record.led_until_s if what == "leads" else record.obeyed_until_s
-                until_s = last_s if restarted else time_s if ended_s is None else ended_s
+                if restarted:
+                    ended_s = last_s if silent_from_s is None else silent_from_s
+                until_s = time_s if ended_s is None else ended_s
                 yield _spell(peer, present, since_s, max(since_s, until_s))
                 present = None
             if present is None and reign is not None:
                 present, since_s = reign, time_s
-            incarnation = record.incarnation
+            incarnation, silent_from_s = record.incarnation, None
         last_s = time_s
     if present is not None:
         yield _spell(peer, present, since_s, last_s)

@@ -17,6 +17,7 @@ from agents.motion_level import AGENT, CHAIN, TEAM, certified_level
 from agents.self_report import silence_s
 from launcher.contacts import Overlap, find_overlaps
 from launcher.mission_trace import MissionTrace, Trail
+from launcher.reigns import Spell, Takeover
 from launcher.report_estimate import EstimateFigures, failures_of, measure_estimates
 from launcher.report_trees import SettledProposal, settled_proposals
 from launcher.wording import counted
@@ -106,6 +107,12 @@ class Metrics(msgspec.Struct, frozen=True, kw_only=True):
     """Of robots and the agent, which goes where it likes."""
     estimate: EstimateFigures | None
     """Of an agent that does not announce."""
+    reigns: tuple[Spell, ...]
+    """Who led, by time."""
+    takeovers: tuple[Takeover, ...]
+    """How long the team was without a leader when one was killed, paused or cut off."""
+    leading_faults: tuple[str, ...] | None
+    """Rules of leading that a recording breaks; none of a simulation, which is judged while it runs."""
     failures: tuple[str, ...]
     """What must not happen, and did; sentences."""
     warnings: int
@@ -170,6 +177,9 @@ def measure(trace: MissionTrace, environment: Environment) -> Metrics:
         overlaps=overlaps,
         agent_contacts=tuple(contact for contact in contacts if contact not in overlaps),
         estimate=estimate,
+        reigns=trace.reigns.led,
+        takeovers=trace.reigns.takeovers,
+        leading_faults=None,
         failures=(
             *(
                 f"{' and '.join(overlap.peers)} overlapped {counted(overlap.episodes, 'time')}, "

@@ -6,6 +6,7 @@ from rich.console import Group
 from rich.table import Table
 
 from launcher.contacts import Overlap
+from launcher.reigns import Spell, Takeover
 from launcher.report import Metrics, Shares
 from launcher.report_estimate import EstimateFigures
 from launcher.report_trees import describe_trees, tabulate_trees
@@ -51,6 +52,9 @@ def render(metrics: Metrics) -> Group:
         ("tree", describe_trees(metrics.trees)),
         ("motion", _describe_motion(metrics)),
         *_describe_estimate(metrics.estimate),
+        ("leaders", _describe_reigns(metrics.reigns)),
+        *(("takeover", _describe_takeover(takeover)) for takeover in metrics.takeovers),
+        *(("rules of leading", text) for text in _describe_rules(metrics)),
         ("overlapping robots", _describe_contacts(metrics.overlaps)),
         ("robots at the agent", _describe_contacts(metrics.agent_contacts) + ", as it goes where it likes"),
         ("log", f"{metrics.warnings} warnings, {metrics.errors} errors, in the recording and in logs/"),
@@ -98,6 +102,26 @@ def _describe_estimate(figures: EstimateFigures | None) -> list[tuple[str, str]]
             f"{figures.late} came too late",
         ),
     ]
+
+
+def _describe_reigns(reigns: tuple[Spell, ...]) -> str:
+    if not reigns:
+        return "none"
+    return ", ".join(f"{spell.peer} {spell.from_s:.1f}–{spell.until_s:.1f} s" for spell in reigns)
+
+
+def _describe_rules(metrics: Metrics) -> list[str]:
+    if metrics.leading_faults is None or not metrics.reigns:
+        return []
+    if metrics.leading_faults:
+        return [f"broken {counted(len(metrics.leading_faults), 'time')}: {metrics.leading_faults[0]}"]
+    return ["kept: one leader at a time, orders in office only, rising epochs, trees that join whom they name"]
+
+
+def _describe_takeover(takeover: Takeover) -> str:
+    if takeover.took_s is None:
+        return f"{takeover.at_s:.1f} s: {takeover.what}, and nobody was obeyed by all others from then on"
+    return f"{takeover.at_s:.1f} s: {takeover.what}; all others obeyed {takeover.after} after {takeover.took_s:.2f} s"
 
 
 def _describe_contacts(contacts: tuple[Overlap, ...]) -> str:
