@@ -18,7 +18,7 @@ from agents.shell import PeerShell
 from launcher.fault_timetable import Kill, Timetable
 from launcher.kept_memory import count_kept
 from launcher.order_rules import MotionRules, OrderRules
-from launcher.simulated_peer import SimulatedPeer
+from launcher.simulated_peer import SimulatedPeer, holds_lease
 from launcher.simulation import SimulatedTeam
 from launcher.tree_rules import TreeRules
 from launcher.violation import Violation
@@ -132,16 +132,15 @@ class OfficeRules:
         if self._known.get(peer.name) == now:
             return
         self._known[peer.name] = now
-        leads, obeyed = own.leads(peer.now_s), own.obeyed(peer.now_s)
-        if leads and own.reign != self._last:
-            self._begin(own.reign)
+        leads, obeyed = holds_lease(peer), _obeyed(peer)
+        if leads and election.office != self._last:
+            self._begin(election.office)
         for other in self._peers.values():
-            theirs = other.allegiance
-            if theirs is None or other is peer:
+            if other is peer or other.allegiance is None:
                 continue
-            if leads and theirs.leads(other.now_s):
+            if leads and holds_lease(other):
                 raise Violation("one leads", f"{peer.name} and {other.name} hold leases")
-            follows = theirs.obeyed(other.now_s)
+            follows = _obeyed(other)
             if leads and follows is not None and follows.leader != peer.name:
                 raise Violation("who obeys obeys who leads", f"{other.name} obeys {follows.leader}, {peer.name} leads")
             if obeyed is None:
@@ -149,13 +148,21 @@ class OfficeRules:
             if follows is not None and _process(follows) != _process(obeyed):
                 text = f"{peer.name} obeys {_process(obeyed)}, {other.name} obeys {_process(follows)}"
                 raise Violation("all obey the same", text)
-            if theirs.leads(other.now_s) and obeyed.leader != other.name:
+            if holds_lease(other) and obeyed.leader != other.name:
                 raise Violation("who obeys obeys who leads", f"{peer.name} obeys {obeyed.leader}, {other.name} leads")
 
     def _begin(self, reign: Reign | None) -> None:
         if self._keeps_disks and self._last is not None and reign is not None and reign.epoch <= self._last.epoch:
             raise Violation("epochs rise", f"epoch {reign.epoch} of {reign.leader} after {self._last.epoch}")
         self._last = reign
+
+
+def _obeyed(peer: SimulatedPeer) -> Reign | None:
+    """Whose orders are in force at a peer now."""
+    if peer.allegiance is None:
+        return None
+    obedience = peer.allegiance.election.obedience
+    return obedience.last if peer.now_s < obedience.until_s else None
 
 
 def _process(reign: Reign) -> tuple[str, int]:

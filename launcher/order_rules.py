@@ -10,7 +10,7 @@ from typing import Final
 from agents.motion_message import end_stage, piece
 from agents.robot import Robot
 from agents.standing_orders import StandingOrders
-from launcher.simulated_peer import SimulatedPeer
+from launcher.simulated_peer import SimulatedPeer, holds_lease
 from launcher.violation import Violation
 from protocol.messages import Authority, Deployment, Envelope, MemberWay, Motion, Progress, State, Warrant
 
@@ -45,7 +45,7 @@ class OrderRules:
         warrant = getattr(envelope.body, "warrant", None)
         if not isinstance(warrant, Warrant):
             return
-        if peer.allegiance is None or not peer.allegiance.leads(peer.now_s):
+        if not holds_lease(peer):
             raise Violation("orders are given within a lease", f"{peer.name} says {envelope.kind} without one")
         if isinstance(envelope.body, Deployment):
             authority = envelope.body.authority
@@ -122,7 +122,7 @@ class MotionRules:
         if progress is not None and progress.retreat is not None:
             self._judge_retreat(peer.name, progress, progress.retreat)
             return
-        late_s = peer.drives_until_s - peer.clock.when(peer.allegiance.obeyed_until_s)
+        late_s = peer.drives_until_s - peer.clock.when(peer.allegiance.election.obedience.until_s)
         if late_s > ROUNDING_S:
             raise Violation("nobody moves who obeys nobody", f"{peer.name} is to drive {late_s:.3f} s longer")
 

@@ -18,8 +18,12 @@ LOOK_S: Final = 0.05
 LED_S: Final = 3.0 * LEASE_S / (1.0 - CLOCK_DRIFT)
 """By then all obey somebody, even if all clocks are slow."""
 
+JOBS: Final = 4
+"""Computations that follow each other before a plan is in force: the plan, its links as the leader foresees them, its
+certificate, and the links as their ends judge them."""
+
 PLANNED_S: Final = 1.0
-"""So long after that the robots have a plan, and what planning takes."""
+"""So long after that the robots have a plan, and what these take."""
 
 
 class RecoveryRules:
@@ -65,7 +69,7 @@ class RecoveryRules:
         idle = [peer.name for peer in self._voters() if not self._has_plan(peer)]
         if not idle:
             self.planned_after_s = after_s
-        elif after_s > self.led_after_s + PLANNED_S + 3.0 * self._mission.planning_delay_s:
+        elif after_s > self.led_after_s + PLANNED_S + JOBS * self._mission.planning_delay_s:
             text = f"{after_s - self.led_after_s:.1f} s after all obey a leader {', '.join(idle)} have no plan"
             raise Violation("a team that is led has a plan soon", text)
 

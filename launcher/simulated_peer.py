@@ -338,6 +338,14 @@ class SimulatedPeer:
             self._end_event()
 
 
+def holds_lease(peer: SimulatedPeer) -> bool:
+    """Whether a peer believes now that it holds an unexpired lease; also one that is paused."""
+    if peer.allegiance is None:
+        return False
+    election = peer.allegiance.election
+    return election.office is not None and peer.now_s < election.lease_until_s
+
+
 class _TrueBody:
     """A body as the mind has it: it moves by true time, and never for longer than it was told by either clock."""
 

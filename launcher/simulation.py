@@ -14,7 +14,7 @@ from agents.records import AnyRecord
 from launcher.fault_injection import FaultInjection
 from launcher.fault_timetable import Timetable
 from launcher.mission_trace import MissionTrace
-from launcher.simulated_peer import SimulatedPeer
+from launcher.simulated_peer import SimulatedPeer, holds_lease
 from planning.environment import Environment
 from protocol.simulated_bus import SimulatedNetwork, VirtualTime
 
@@ -73,10 +73,7 @@ class SimulatedTeam:
 
     def leader(self) -> str | None:
         """Who holds an unexpired lease now."""
-        for name, peer in self.peers.items():
-            if peer.allegiance is not None and peer.allegiance.leads(peer.now_s):
-                return name
-        return None
+        return next((name for name, peer in self.peers.items() if holds_lease(peer)), None)
 
 
 def simulate(
