@@ -59,8 +59,9 @@ class Retreat:
     ) -> None:
         self.stage = stage
         """What it says: it is not beyond the beginning of this stage, and never will be again in this plan."""
+        self.others = tuple(sorted(others))
+        """Whom it goes back with; if none it stands."""
         self._plan = plan
-        self._others = tuple(sorted(others))
         self._pieces = deque(deque(piece) for piece in pieces)
         self._from = position
         """Where the straight begins that it is on."""
@@ -72,11 +73,6 @@ class Retreat:
         """Others that have forgotten the plan. They do not come back to it."""
 
     @property
-    def alone(self) -> bool:
-        """Whether there is nobody to go back with: then it stands."""
-        return not self._others
-
-    @property
     def ahead(self) -> tuple[Point, ...]:
         """Waypoints of the way back, as far as it is remembered."""
         places = (place for piece in self._pieces for place in piece)
@@ -84,7 +80,7 @@ class Retreat:
 
     def hear(self, member: str, progress: Progress | None, now_s: float) -> None:
         """Learn from another member's state where it is."""
-        if member not in self._others:
+        if member not in self.others:
             return
         if progress is None or (progress.epoch, progress.plan) > self._plan:
             self._left.add(member)
@@ -96,7 +92,7 @@ class Retreat:
         """Others without whom nobody goes back: who have not turned, are not heard, or have left the plan."""
         return tuple(
             name
-            for name in self._others
+            for name in self.others
             if name in self._left or name not in self._heard or now_s - self._heard[name][1] > self._silence_s
         )
 
@@ -122,7 +118,7 @@ class Retreat:
 
     def _may_enter(self, stage: int, now_s: float) -> bool:
         return (
-            not self.alone
+            len(self.others) > 0
             and not self.missing(now_s)
             and all(beginning <= stage + 2 for beginning, _ in self._heard.values())
         )

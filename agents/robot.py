@@ -186,12 +186,12 @@ class Robot:
         leg, missing = retreat.steer(position, now_s), retreat.missing(now_s)
         if missing != self._without:
             self._without = missing
-            if retreat.alone:
-                does = "stands, as it has nobody to go back with"
+            if not retreat.others:
+                does = "holds, as there is nobody to go back with"
             elif missing:
-                does = f"goes back with all that it moved with, and stands as {', '.join(missing)} cannot be counted on"
+                does = f"would go back, and stands until {', '.join(missing)} would too"
             else:
-                does = "goes back with all that it moved with"
+                does = f"goes back together with {', '.join(retreat.others)}"
             self._log("warning", f"nobody has led for {self._retreat_after_s:g} s: {does}")
         return leg
 

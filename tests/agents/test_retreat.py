@@ -296,7 +296,7 @@ def retreat(*others: str, stage: int = 2, pieces: Iterable[Iterable[Point]] = ((
 
 def test_alone_it_stands() -> None:
     mine = retreat()
-    assert mine.alone
+    assert mine.others == ()
     assert mine.steer((2.0, 0.0), 0.0) == STANDING
 
 
