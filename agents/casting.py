@@ -103,7 +103,7 @@ class Casting:
         knowing: list[Part] = [allegiance, orders, collection]
         estimate = None
         if not mission.announces:
-            estimate = SharedEstimate(mission, entry.name, incarnation, self._sight)
+            estimate = SharedEstimate(mission, entry.name, incarnation, self.sight)
             knowing += [estimate, Ranging(mission, entry.name, estimate)]
         planner = _Planner(self.team_planner)
         negotiating: list[Part] = [
@@ -118,7 +118,7 @@ class Casting:
         return Mind([*knowing, body, *negotiating, leadership])
 
     @cached_property
-    def _sight(self) -> Sight:
+    def sight(self) -> Sight:
         """For the estimate: where the agent's body can be, and from where it is seen."""
         mission = self._mission
         room = self._space(max(mission.agent_radius_m - CLEARANCE_M, 0.0), mission.tracked_agent.start).free
