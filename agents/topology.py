@@ -324,7 +324,10 @@ class TeamTree:
             for edge, stage in zip(wish.edges, stages, strict=True)
             if motion is not None and stage is not None
         }
-        self._negotiate(Propose(wish.members, wish.edges, since, wish.method, wish.reason), now_s)
+        base = self._voters[0]
+        # The base station stands where everybody knows: the team need not wait until its process is there again.
+        absent = frozenset[str]() if self._allegiance.presence(base) is Presence.PRESENT else frozenset({base})
+        self._negotiate(Propose(wish.members, wish.edges, since, wish.method, wish.reason, absent), now_s)
 
     def _settle(self, done: Settled) -> None:
         self._news = True

@@ -68,6 +68,8 @@ class Propose:
     """From when on the ends of a link will see each other; links that are not in it: now."""
     method: Method
     reason: str
+    absent: frozenset[str] = frozenset()
+    """Who stands and is not there to answer: of a link to them only the other end is asked."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +111,7 @@ class _Open:
 
     proposal: TreeProposal
     opened_s: float
+    absent: frozenset[str]
 
 
 @dataclass(slots=True)
@@ -254,7 +257,7 @@ class Negotiation:
             round=0,
         )
         self._sequence += 1
-        self._open = _Open(proposal, now_s)
+        self._open = _Open(proposal, now_s, wish.absent)
         self._occur(Occurrence.PROPOSED)
         self._say(now_s)
         self._commit_if_confirmed(now_s)
@@ -312,7 +315,7 @@ class Negotiation:
     def _verdicts_missing(self, end: str) -> bool:
         """Whether this end of new links has yet to say that it sees, or will see, all of their other ends."""
         assert self._open is not None
-        if end not in self._voices:
+        if end not in self._voices or end in self._open.absent:
             return False
         known = self._heard.get(end)
         if known is None or known.word.proposal != self._open.proposal.tree.number:
