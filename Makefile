@@ -26,7 +26,7 @@ bench: $(READY)
 
 docs: $(READY)
 	$(BIN)/python -m protocol.schemas docs/messages
-	$(BIN)/python -m protocol.election_diagram
+	$(BIN)/python -m protocol.state_diagrams
 
 # Needs uv (`pip install uv`); the lock holds hashes for every platform and Python >= 3.11.
 lock:

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, rule
 
-from protocol import election, election_diagram
+from protocol import election, state_diagrams
 from protocol.core import Heard, Note, Persist, Say, Tick, WakeAt, Written
 from protocol.election import (
     LARGEST_LEAP,
@@ -378,10 +378,11 @@ def test_the_table_names_every_state_and_reaches_each() -> None:
     assert {occurrence for row in TRANSITIONS.values() for occurrence in row} == set(Occurrence)
 
 
-def test_the_diagram_in_the_documents_is_made_from_the_table() -> None:
-    page = election_diagram.PAGE.read_text(encoding="utf-8")
-    assert page == election_diagram.with_diagram(page), (
-        "run `python -m protocol.election_diagram` and commit the result"
+@pytest.mark.parametrize("page", state_diagrams.PAGES, ids=lambda page: page.name)
+def test_the_diagrams_in_the_documents_are_made_from_the_tables(page: state_diagrams.Page) -> None:
+    text = page.file.read_text(encoding="utf-8")
+    assert text == state_diagrams.with_diagram(page, text), (
+        "run `python -m protocol.state_diagrams` and commit the result"
     )
 
 
