@@ -6,11 +6,17 @@ it is given.
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from agents.mission import Mission
+from agents.role import Heard, Woken
+from agents.shared_estimate import SharedEstimate
+from agents.target_set import TargetSet
 from planning.connectivity import chain_connected
 from planning.environment import Environment
 from protocol.bus import BusEvent, PeerAppeared, PeerVanished, Received
@@ -22,6 +28,7 @@ from protocol.messages import (
     Heartbeat,
     Intent,
     MalformedMessage,
+    Placement,
     Point,
     State,
     VoteRequest,
@@ -54,11 +61,15 @@ class Status:
     """Where the agent says it goes."""
     deployment: Deployment | None
     """The leader's standing order."""
-    agent_visible: bool
-    """The base station or some robot that is up sees the agent."""
+    leader: str | None
+    """Who has been heard to lead lately."""
+    estimate: TargetSet | None
+    """Where an independent agent may be: nobody is told where it is."""
+    agent_visible: bool | None
+    """The base station or some robot that is up sees the agent; None: nobody knows."""
     chain_connected: bool
     """The agent is joined to the base station through robots that see one another; by true line of sight between the
-    positions heard, through the map's walls."""
+    positions heard, through the map's walls. Of an independent agent: the base station is joined to all relays so."""
     links: int
     """Pairs of the team that see each other."""
 
@@ -87,10 +98,11 @@ class _Known:
 
 @dataclass
 class TeamView:
-    """What has been heard of a team."""
+    """What has been heard of a team; of an independent agent also by an estimate that only listens."""
 
     mission: Mission
     environment: Environment
+    estimate: SharedEstimate | None = None
     malformed: int = 0
     """Messages that were no message of this schema, or not by the peer whose key they used."""
     goal: Point | None = None
@@ -125,6 +137,8 @@ class TeamView:
                 if envelope.sender != address.speaker or envelope.sender not in self._known:
                     self.malformed += 1
                     return
+                if self.estimate is not None and address.kind in self.estimate.hears:
+                    deque(self.estimate.handle(Heard(address, envelope), now_s), maxlen=0)
                 self._hear(envelope, now_s)
 
     def _hear(self, envelope: Envelope, now_s: float) -> None:
@@ -160,19 +174,33 @@ class TeamView:
         if placed:
             seen = self.environment.visibility_matrix(np.array([position for _, position in placed]))
         base, agent = self.mission.base_station.name, self.mission.tracked_agent.name
-        agent_visible = connected = False
-        if agent in names:
+        visible: bool | None = False
+        connected = False
+        target = None
+        if self.estimate is not None:
+            deque(self.estimate.handle(Woken((0.0, 0.0)), now_s), maxlen=0)
+            target = self.estimate.target(now_s)
+            visible = None
+            chain = [base, *(placement.robot for placement in self._relays())]
+            connected = all(name in names for name in chain) and _joined(seen, [names.index(name) for name in chain])
+        elif agent in names:
             j = names.index(agent)
-            agent_visible = bool(seen[j].sum() > 1)
+            visible = bool(seen[j].sum() > 1)
             connected = base in names and chain_connected(seen, names.index(base), j)
         return Status(
             peers=peers,
             goal=self.goal,
             deployment=self.deployment,
-            agent_visible=agent_visible,
+            leader=self.leader(now_s),
+            estimate=target,
+            agent_visible=visible,
             chain_connected=connected,
             links=int((seen.sum() - len(placed)) // 2),
         )
+
+    def _relays(self) -> tuple[Placement, ...]:
+        placements = self.deployment.placements if self.deployment else ()
+        return tuple(placement for placement in placements if not placement.spare)
 
     def _note_reign(self, epoch: int, leader: str, now_s: float) -> None:
         """A leader in office has spoken; an earlier reign that goes on speaking does not count."""
@@ -184,6 +212,11 @@ class TeamView:
         up = known.spoke and known.token and now_s - known.heard_at_s < SILENT_AFTER_S
         mode = known.mode if up or not known.spoke else "lost"
         return PeerStatus(name, up, mode, known.position, known.obeying)
+
+
+def _joined(seen: NDArray[np.bool_], chosen: Sequence[int]) -> bool:
+    """Whether all chosen rows are one network, over any others."""
+    return all(chain_connected(seen, chosen[0], other) for other in chosen[1:])
 
 
 def _later(new: Deployment, old: Deployment) -> bool:

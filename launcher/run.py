@@ -20,8 +20,10 @@ from rich.console import Console
 from rich.live import Live
 
 from agents.body_places import BODIES, BodyPlaces
+from agents.casting import Casting
 from agents.mission import Mission
 from agents.runtime import import_all
+from agents.shared_estimate import SharedEstimate
 from launcher import status as display
 from launcher.chaos import Chaos, LiveFault, check_live
 from launcher.chaos_control import KEYS, hearing_keys, listening, obey, order_of_key
@@ -43,6 +45,8 @@ STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 LOOK_S = 0.2
 """How often the launcher looks at what it has heard."""
+LISTENER = 1 << 40
+"""Incarnation of an estimate that has no ranges of its own: no process has such a one."""
 LINE_S = 5.0
 """Where there is no terminal: how often it says how the team is; a chain that breaks or holds again is said at once."""
 
@@ -99,12 +103,13 @@ def run(
     names = [entry.name for entry in roster]
     bodies = BodyPlaces(folder.path / BODIES, names, create=True)
     links = LinkTable(folder.path / LINKS, names, create=True)
+    view = TeamView(mission, preparation.environment, _listener(preparation, mission))
     journal = Journal(mission, folder.path, console)
     supervisor = Supervisor(mission, folder.path, preparation.planner, journal.tell, journal.crashed, bodies.get)
     stop = asyncio.Event()
     _launch(supervisor, stop)
     tell("Processes: " + ", ".join(f"{peer.name} {peer.pid}" for peer in supervisor.peers.values()), console)
-    team = Team(mission, TeamView(mission, preparation.environment), supervisor, links, journal)
+    team = Team(mission, view, supervisor, links, journal)
     try:
         asyncio.run(_accompany(team, faults, course, stop, console))
     finally:
@@ -121,6 +126,14 @@ class Team:
     supervisor: Supervisor
     links: LinkTable
     journal: Journal
+
+
+def _listener(preparation: Preparation, mission: Mission) -> SharedEstimate | None:
+    """What the team knows of an independent agent, for the status; None of one that announces."""
+    if mission.announces:
+        return None
+    sight = Casting(mission, preparation.environment, preparation.planner).sight
+    return SharedEstimate(mission, mission.base_station.name, LISTENER, sight)
 
 
 def _faults(file: Path, preparation: Preparation, mission: Mission, timetable: Path | None) -> tuple[LiveFault, ...]:

@@ -27,9 +27,12 @@ def describe(status: Status, now_s: float) -> str:
     if status.deployment is None:
         return f"{up}, starting"
     chain = "chain connected" if status.chain_connected else "chain broken"
+    leads = f", {status.leader} leads" if status.leader else ", nobody leads"
     sight = "" if status.chain_connected else ", agent visible" if status.agent_visible else ", agent out of sight"
+    if status.agent_visible is None:
+        sight = f", agent {_whereabouts(status)}"
     goal = f", agent to {_place(status.goal)}" if status.goal else ""
-    return f"{up}, {chain}{sight}, {_relays(status)}, {status.links} lines of sight{goal}"
+    return f"{up}{leads}, {chain}{sight}, {_relays(status)}, {status.links} lines of sight{goal}"
 
 
 def draw(status: Status, mission: Mission, now_s: float) -> Table:
@@ -37,7 +40,10 @@ def draw(status: Status, mission: Mission, now_s: float) -> Table:
     length = f" of {mission.duration_s:g} s" if mission.duration_s is not None else " s, Ctrl-C ends the run"
     chain = Text("chain connected", "bold green") if status.chain_connected else Text("chain broken", "bold red")
     sight = Text("agent visible", "green") if status.agent_visible else Text("agent out of sight", "red")
-    words = [Text("starting", "dim")] if status.deployment is None else [chain, sight]
+    if status.agent_visible is None:
+        sight = Text(f"agent {_whereabouts(status)}")
+    leads = Text(f"{status.leader} leads") if status.leader else Text("nobody leads", "bold red")
+    words = [Text("starting", "dim")] if status.deployment is None else [leads, chain, sight]
     table = Table(
         title=Text(" · ").join([Text(f"{mission.team}  {now_s:.0f}{length}"), *words]),
         title_justify="left",
@@ -54,6 +60,7 @@ def draw(status: Status, mission: Mission, now_s: float) -> Table:
     )
     for peer, entry in zip(status.peers, mission.roster, strict=True):
         walk = f"walks to {_place(status.goal)}" if status.goal else "has no goal"
+        walk = walk if mission.announces else _whereabouts(status)
         task = {"base_station": "base station", "tracked_agent": walk}.get(entry.role, "")
         if entry.role == "robot" and peer.name in spare:
             task = "spare" if spare[peer.name] else "relay"
@@ -70,6 +77,12 @@ def _deployment(status: Status) -> str:
 
 def _relays(status: Status) -> str:
     return f"{status.relays} relay{'' if status.relays == 1 else 's'}"
+
+
+def _whereabouts(status: Status) -> str:
+    """What is known of an agent that tells nothing."""
+    target = status.estimate
+    return "not heard of yet" if target is None else f"within {target.area_m2:.1f} m² at {_place(target.center)}"
 
 
 def _place(point: Point | None) -> str:
