@@ -63,6 +63,8 @@ class _Pending:
     planning_s: float
     revision: tuple[int, int] | None
     """Plan and revision of the motion that leads there."""
+    base_there: bool
+    """Whether the base station was, when it was proposed: then its answer is waited for."""
 
 
 class ReignDuty:
@@ -256,7 +258,7 @@ class ReignDuty:
             return
         self._dispatcher.permit(False)
         plan, motion = answer.plan, self._dispatcher.motion
-        self._pending = _Pending(plan, planning_s, _revision(motion))
+        self._pending = _Pending(plan, planning_s, _revision(motion), self._base_there)
         self._effects += self._tree.propose(plan.edges, motion, self._mission.topology, plan.reason, now_s)
 
     def _settle(self, now_s: float) -> None:
@@ -267,12 +269,22 @@ class ReignDuty:
         if self._tree.is_in_force(pending.plan.edges):
             self._decide(pending.plan, pending.planning_s)
             self._dispatcher.permit(True)
-        elif self._tree.busy and pending.revision == _revision(self._dispatcher.motion):
-            return
+        elif pending.base_there and not self._base_there:
+            self._give_up("the base station is not there any more, and is not asked again", now_s)
+        elif pending.revision != _revision(self._dispatcher.motion) or not self._tree.busy:
+            self._give_up("the motion to it has ended", now_s)
         else:
-            self._effects += self._tree.withdraw("the motion to it has ended", now_s)
-            self._urgent = True
+            return
         self._pending = None
+
+    def _give_up(self, why: str, now_s: float) -> None:
+        """Propose no more what is proposed, and plan afresh."""
+        self._effects += self._tree.withdraw(why, now_s)
+        self._urgent = True
+
+    @property
+    def _base_there(self) -> bool:
+        return self._allegiance.presence(self._mission.base_station.name) is Presence.PRESENT
 
     def _decide(self, plan: Plan, planning_s: float) -> None:
         """Take a deployment over, and say so soon unless it is the same as before."""
