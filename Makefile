@@ -4,7 +4,7 @@ PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; 
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: demo test lint bench docs lock clean
+.PHONY: demo test lint bench takeover fuzz docs lock clean
 
 demo: $(READY)
 	$(BIN)/sightline demo
@@ -24,6 +24,18 @@ bench: $(READY)
 		--requirement tests/benchmarks/references.lock
 	$(BIN)/python -m tests.benchmarks
 
+# Real processes lose their leader, a robot, each other: about a quarter of an hour.
+takeover: $(READY)
+	$(BIN)/python -m tests.campaigns.takeover
+
+# A million inputs of our own, then as many of atheris, which is no dependency: without it the second half is left out.
+fuzz: $(READY)
+	-@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --require-hashes \
+		--requirement tests/campaigns/fuzzer.lock
+	$(BIN)/python -m tests.campaigns.fuzz
+	@if $(BIN)/python -c 'import atheris' 2>/dev/null; then $(BIN)/python -m tests.campaigns.fuzz --guided; \
+		else echo "atheris is not installed: no guided inputs"; fi
+
 docs: $(READY)
 	$(BIN)/python -m protocol.schemas docs/messages
 	$(BIN)/python -m protocol.state_diagrams
@@ -34,6 +46,8 @@ lock:
 		--no-annotate --group test --group lint --group build pyproject.toml -o requirements.lock
 	printf 'filterpy\ncodac\n' | uv pip compile --universal --python-version 3.11 --no-deps --generate-hashes --no-header \
 		--no-emit-index-url --no-annotate - -o tests/benchmarks/references.lock
+	printf 'atheris==3.0.0\n' | uv pip compile --universal --python-version 3.11 --no-deps --generate-hashes --no-header \
+		--no-emit-index-url --no-annotate - -o tests/campaigns/fuzzer.lock
 
 $(READY): requirements.lock pyproject.toml
 	@test -n "$(PYTHON)" || { echo "Sightline needs Python 3.11 or newer: install it, or say make PYTHON=/path/to/python3"; exit 2; }
