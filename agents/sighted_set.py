@@ -7,6 +7,7 @@ set that the place of measuring does not see.
 
 from __future__ import annotations
 
+import math
 from copy import deepcopy
 from dataclasses import dataclass
 from functools import lru_cache
@@ -158,3 +159,12 @@ def outlines(pieces: list[Floats]) -> NDArray[np.object_]:
     """(n,) polygons around convex pieces, valid whatever rounding has made of their corners."""
     hulls = shapely.convex_hull(np.array([shapely.MultiPoint(piece) for piece in pieces], dtype=object))
     return np.asarray(shapely.buffer(hulls, ROUNDING_M, quad_segs=1))
+
+
+def rehearse(sight: Sight, places: list[Point], target: Point) -> None:
+    """Go once through all that estimating takes, with ranges from some places: what it loads is there from then on."""
+    held = SightedSet(sight)
+    for place in places * 3:
+        held.measure(place, math.dist(place, target), 0.2)
+        held.predict(0.05)
+    sight.sketch(held.tight)
