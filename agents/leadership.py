@@ -19,8 +19,9 @@ from agents.auction import Auctioneer
 from agents.collection import Collection
 from agents.mission import Mission
 from agents.planning_job import Answer, Question
-from agents.reign_duty import GRACE_S, Body, ReignDuty
+from agents.reign_duty import GRACE_S, ReignDuty
 from agents.role import Compute, Effect, Event, JobDone
+from agents.roll_call import Body
 from agents.standing_orders import StandingOrders
 from agents.topology import TeamTree
 

@@ -12,24 +12,25 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, Literal, Protocol
+from typing import TYPE_CHECKING, Final, Literal
 
 from msgspec import structs
 
 from agents.agent_knowledge import AgentKnowledge
 from agents.allegiance import Allegiance
 from agents.collection import Collection
-from agents.dispatcher import Dispatcher, has_heard
+from agents.dispatcher import Dispatcher
 from agents.mission import Mission
 from agents.orders import changes_topology, first_orders, is_decision, plan_of, renew
 from agents.planning_job import Answer, Question
 from agents.records import Advance, Decision, LogLine, Ordered, Planned
 from agents.rhythm import EARLY_S, Rhythm
 from agents.role import Effect, JobDone, Publish, Record
+from agents.roll_call import Body, RollCall
 from agents.standing_orders import StandingOrders
 from agents.topology import TeamTree
 from protocol.membership import Presence
-from protocol.messages import Authority, Motion, Reign, State
+from protocol.messages import Authority, Motion, Reign
 
 if TYPE_CHECKING:
     from agents.leader import Plan
@@ -45,14 +46,6 @@ AGAIN_S: Final = 0.2
 
 PACE_S: Final = 0.04
 """Deployments are at least so far apart, however much there is to release."""
-
-
-class Body(Protocol):
-    """What the leader needs of its own body."""
-
-    @property
-    def state(self) -> State | None:
-        """What this robot says of itself."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,10 +91,9 @@ class ReignDuty:
         complete_by_s: float,
     ) -> None:
         self.reign = reign
-        self._mission, self._allegiance, self._standing, self._body = mission, allegiance, orders, body
-        self._collection, self._agent, self._tree = collection, agent, tree
+        self._mission, self._allegiance, self._standing = mission, allegiance, orders
+        self._agent, self._tree = agent, tree
         self._complete_by_s = complete_by_s
-        self._robots = tuple(robot.name for robot in mission.robots)
         places = {robot.name: collection.whereabouts(robot.name) or (robot.start,) for robot in mission.robots}
         base = mission.base_station
         self._dispatcher = Dispatcher(base.name, base.start, places, reign.epoch, mission.robot_radius_m)
@@ -112,9 +104,8 @@ class ReignDuty:
         self._plan: Plan | None = plan_of(told, mission.tracked_agent.name)
         self._pending: _Pending | None = None
         """The plan whose tree is being negotiated."""
-        self._heard: dict[str, State] = {}
-        self._deaf: dict[str, Authority] = {}
-        """Robots that do not hear the leader, and when they were given up."""
+        robots = [robot.name for robot in mission.robots]
+        self._roll = RollCall(robots, allegiance.name, collection, body, self._dispatcher)
         self._goal: object = None
         """Where the agent was going when that was looked at last."""
         self._replanning = Rhythm(mission.planning_period_s, now_s)
@@ -145,33 +136,13 @@ class ReignDuty:
         return effects
 
     def _follow(self, now_s: float) -> None:
-        """Tell the dispatcher who is where, who is new and who is lost, and note where the agent goes."""
-        for robot in self._robots:
-            state, before = self._state(robot), self._heard.get(robot)
-            if robot in self._deaf and (state is None or has_heard(state, self._deaf[robot])):
-                del self._deaf[robot]
-            if state is None or robot in self._deaf:
-                self._lose(robot)
-            elif state is not before:
-                self._urgent = self._urgent or before is None
-                self._heard[robot] = state
-                self._dispatcher.hear(robot, state, now_s)
-        for robot in self._dispatcher.deaf(now_s):
-            self._deaf[robot] = self._authority
+        """See who is where, who is new and who is lost, and where the agent goes."""
+        changed, given_up = self._roll.hold(self._authority, now_s)
+        for robot in given_up:
             self._log("warning", f"{robot} does not answer: the team goes on without it")
-            self._lose(robot)
-        if (goal := self._agent.goal()) != self._goal:
-            self._goal = goal
-            self._urgent = True
-
-    def _state(self, robot: str) -> State | None:
-        own = robot == self._allegiance.name
-        return self._collection.state(robot) if not own or self._body is None else self._body.state
-
-    def _lose(self, robot: str) -> None:
-        if self._heard.pop(robot, None) is not None:
-            self._dispatcher.lose(robot)
-            self._urgent = True
+        goal = self._agent.goal()
+        self._urgent = self._urgent or changed or goal != self._goal
+        self._goal = goal
 
     def _heed(self, now_s: float) -> None:
         """See to what the dispatcher has come to, after it was told something."""
@@ -215,8 +186,7 @@ class ReignDuty:
     def _is_complete(self, now_s: float) -> bool:
         if now_s >= self._complete_by_s:
             return True
-        missing = (robot for robot in self._robots if robot not in self._heard)
-        return all(self._allegiance.presence(robot) is Presence.GONE for robot in missing)
+        return all(self._allegiance.presence(robot) is Presence.GONE for robot in self._roll.missing)
 
     def take(self, done: JobDone, now_s: float) -> None:
         """Take over what was planned: a new decision, other places for the spares, another motion, or nothing new."""
@@ -248,7 +218,7 @@ class ReignDuty:
         """Whether the tree in force still does for where the agent may be, with the robots that are there."""
         placements = () if self._plan is None else self._plan.placements
         goals = {placement.robot: placement.position for placement in placements}
-        places = {robot: goals.get(robot, state.position) for robot, state in self._heard.items()}
+        places = {robot: goals.get(robot, state.position) for robot, state in self._roll.states.items()}
         base = self._mission.base_station
         return self._tree.serves({base.name: base.start, **places}, now_s)
 

@@ -192,6 +192,7 @@ def test_two_leaders_die_one_after_the_other_and_a_third_goes_on() -> None:
     leaders = [leader for _, leader in play.leaders()]
     assert len(set(leaders)) == 3
     assert play.plans()[-1][1] == leaders[-1]
+    assert sum(play.travelled_m(robot, 10.0, 14.0) for robot in ROBOTS) > 1.0
 
 
 def test_a_robot_that_does_not_hear_the_leader_does_not_keep_the_team_waiting() -> None:
