@@ -31,6 +31,9 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bytes = NDArray[np.uint8]
 
+SAME_TIME_S: Final = 1e-9
+"""Times that differ by less are rounded."""
+
 STATES_IN_VAIN: Final = 1000
 """Of a search for the best effort, where it is proven that not all get to their goals."""
 
@@ -66,12 +69,11 @@ def search_order(tables: PairTables, demand: Demand, durations: Floats, last: In
     Complexity: O(k² n²) for n elements each; each step or state O(k²).
     """
     bits, starts, sizes = tables.bits, tables.starts, tables.sizes
-    remaining = np.zeros((len(durations), durations.shape[1] + 1))
-    remaining[:, :-1] = np.cumsum(durations[:, ::-1], axis=1)[:, ::-1]
+    remaining = _sum_up(durations)
     closed = mark_prospects(bits, starts, sizes, last, demand.joined, demand.links)
     for i, j in (*closed, *closed[:, ::-1]):
         tables.table(i, j)[...] |= OPEN
-    states = _go_together(bits, starts, sizes, demand.joined, demand.links, remaining, last)
+    states = _go_together(bits, starts, sizes, demand.joined, demand.links, remaining, last, False)
     if np.array_equal(states[-1], last):
         return Order(states, True, False, closed)
     most = min(most_states, STATES_IN_VAIN) if len(closed) > 0 else most_states
@@ -82,6 +84,38 @@ def search_order(tables: PairTables, demand: Demand, durations: Floats, last: In
     if remaining[rows, found[-1]].sum() < remaining[rows, states[-1]].sum():
         states = found
     return Order(states, False, bool(exhausted) or len(closed) > 0, closed)
+
+
+def order_in_time(tables: PairTables, demand: Demand, durations: Floats, last: Ints) -> Ints:
+    """Another way for all to go on together: nobody goes along in a step before it can be where the step begins.
+
+    Of an order found by :func:`search_order`, all pieces of a step are driven at once, however long they are. So robots
+    on the short pieces around a corner go at the pace of those on long ones; here they do not. Where all come by each
+    other at every step, the first is better.
+
+    Args:
+        tables: of all pairs, marked by that search.
+        demand: as there, and so are the others.
+        durations: (k, n) float, seconds.
+        last: (k,) int.
+
+    Returns:
+        (n + 1, k) int: the nodes that the members go through, until nobody can go on.
+
+    Complexity: O(k² n) for n elements each.
+    """
+    remaining = _sum_up(durations)
+    states: Ints = _go_together(
+        tables.bits, tables.starts, tables.sizes, demand.joined, demand.links, remaining, last, True
+    )
+    return states
+
+
+def _sum_up(durations: Floats) -> Floats:
+    """How long each member takes from each of its nodes on: (k, n + 1), seconds."""
+    remaining = np.zeros((len(durations), durations.shape[1] + 1))
+    remaining[:, :-1] = np.cumsum(durations[:, ::-1], axis=1)[:, ::-1]
+    return remaining
 
 
 @kernel
@@ -101,25 +135,39 @@ def _rank(state: Ints, last: Ints, remaining: Floats, ranked: Ints) -> int:
 
 @kernel
 def _go_together(
-    bits: Bytes, starts: Ints, sizes: Ints, joined: int, links: Ints, remaining: Floats, last: Ints
+    bits: Bytes, starts: Ints, sizes: Ints, joined: int, links: Ints, remaining: Floats, last: Ints, in_time: bool
 ) -> Ints:
-    """Steps of as many movers as can, until nobody can: states (n + 1, k)."""
+    """Steps of as many movers as can, until nobody can: states (n + 1, k).
+
+    In time: of as many as can and are at their nodes when those set out that are there first.
+    """
     k = last.shape[0]
     states = np.zeros((last.sum() + 1, k), np.int64)
     state, elements, adjacent, trial, ranked = (
         np.zeros(k, np.int64), np.zeros(k, np.int64), np.zeros(k, np.int64), np.zeros(k, np.int64),
         np.zeros(k, np.int64),
     )  # fmt: skip
+    there = np.zeros(k)  # when each is at its node
     n = 0
     moved = stand(bits, starts, sizes, state, joined, links, elements, adjacent)
     while moved:
         moved = False
         count = _rank(states[n], last, remaining, ranked)
         stand(bits, starts, sizes, state, joined, links, elements, adjacent)
-        for r in range(count):
-            if add_mover(bits, starts, sizes, ranked[r], joined, links, elements, state, adjacent, trial):
+        begun = np.inf
+        for r in np.argsort(there[ranked[:count]], kind="mergesort"):
+            i = ranked[r]
+            if there[i] > begun + SAME_TIME_S:
+                break
+            if add_mover(bits, starts, sizes, i, joined, links, elements, state, adjacent, trial):
                 moved = True
+                if in_time:
+                    begun = min(begun, there[i])
         if moved:
+            if in_time:
+                for i in range(k):
+                    if state[i] > states[n, i]:
+                        there[i] = max(there[i], begun) + remaining[i, states[n, i]] - remaining[i, state[i]]
             n += 1
             states[n] = state
     return states[: n + 1].copy()
