@@ -16,6 +16,7 @@ from agents.leader import MOST_TO_PLAN_ON, DeploymentPlanner, remedy_for
 from agents.mission import Behaviour, Mission, OnDemand, Ranging, RosterEntry, Scripted, Wandering
 from agents.movement_authority import Onset
 from agents.planning_job import Question
+from agents.sighted_set import rehearse
 from launcher.fault_timetable import FaultyTimetable, Timetable, checked
 from launcher.ground import Ground, named
 from launcher.kernels import warm_up
@@ -66,7 +67,7 @@ def prepare(file: Path, announce: Callable[[str], None]) -> Preparation:
     """
     scenario = read_scenario(file)
     map_file = find_map(scenario.map, file.parent, f"{file}: map: ")
-    warm_up(announce, ["planning"])
+    warm_up(announce, ["planning"] if scenario.agent.announces else ["planning", "estimation"])
     ground = Ground.around(file, map_file, "base.position", scenario.base.position, scenario.map_tolerance_m)
     environment = ground.environment
     agent, robots = scenario.agent, scenario.robots
@@ -113,6 +114,8 @@ def _rehearse(file: Path, mission: Mission, casting: Casting) -> None:
         ScenarioFault: the robots cannot set out from their places.
     """
     places = {entry.name: entry.start for entry in (mission.base_station, *mission.robots)}
+    if not mission.announces:
+        rehearse(casting.sight, list(places.values()), mission.tracked_agent.start)
     question = Question(
         way=(mission.tracked_agent.start,), onset=Onset(0, 0, 0, places), lead_s=0.0, previous=None, heading={}
     )
