@@ -112,7 +112,7 @@ class MotionRules:
                 first = next(iter(self._motions))
                 del self._motions[first], self._settled[first]
         elif isinstance(body, State) and body.progress is not None:
-            self._judge(peer, envelope.incarnation, body.progress)
+            self._judge(peer, envelope.incarnation, body.progress, moves=body.velocity != (0.0, 0.0))
 
     def look(self, peer: SimulatedPeer) -> None:
         """No body moves for longer than its mind obeys, but back."""
@@ -139,7 +139,7 @@ class MotionRules:
                     )
                     raise Violation("nothing is released before all have accepted it", text)
 
-    def _judge(self, peer: SimulatedPeer, incarnation: int, progress: Progress) -> None:
+    def _judge(self, peer: SimulatedPeer, incarnation: int, progress: Progress, *, moves: bool) -> None:
         name = peer.name
         before_incarnation, before = self._progress.get(name, (-1, None))
         self._progress[name] = (incarnation, progress)
@@ -152,7 +152,7 @@ class MotionRules:
         if way is None:
             raise Violation("motions accepted are one's own", f"{name} has no way in {_steps(progress)}")
         if progress.retreat is None:
-            self._judge_place(peer, way, motion, progress)
+            self._judge_place(peer, way, motion, progress, moves=moves)
 
     def _judge_retreat(self, name: str, progress: Progress, stage: int) -> None:
         """Whether all that were in the motion have turned, and none has more than a stage left to come back through."""
@@ -166,13 +166,15 @@ class MotionRules:
                     text = f"{name} goes back before stage {stage}, {way.member} has come back to {known.retreat}"
                     raise Violation("nobody goes back ahead of those who are farther", text)
 
-    def _judge_place(self, peer: SimulatedPeer, way: MemberWay, motion: Motion, progress: Progress) -> None:
+    def _judge_place(
+        self, peer: SimulatedPeer, way: MemberWay, motion: Motion, progress: Progress, *, moves: bool
+    ) -> None:
         """Whether the body is where its progress lets it be."""
         stage, place = progress.finished - motion.first_stage, peer.place
         if not 0 <= stage <= end_stage(motion) - motion.first_stage:
             return  # a later message had the rest of it
         onset = way.waypoints[way.stages[stage]]
-        if math.dist(place, onset) <= OFF_M:
+        if math.dist(place, onset) <= OFF_M and not moves:
             return
         name, number = peer.name, progress.finished
         if number == end_stage(motion) or _distance(place, piece(way, stage)) > OFF_M:
