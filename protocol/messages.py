@@ -526,7 +526,11 @@ class RangeBase(Body, frozen=True, kw_only=True, tag="range_base"):
     rings: Annotated[tuple[Ring, ...], msgspec.Meta(max_length=64)]
     """Of the last ranges; they are cut out again as the set becomes thinner."""
     rejections: Count
-    """How many ranges before the last have contradicted the set in a row."""
+    """How many of the last ranges have contradicted the set."""
+    anchor: Point | None = None
+    """Where the last range was measured from; none if it contradicted the set."""
+    slack_m: Extent = 0.0
+    """The agent was in sight of the anchor, or had gone away so far since."""
 
 
 AnyBody: TypeAlias = (

@@ -252,6 +252,8 @@ EXAMPLES: Final[tuple[AnyBody, ...]] = (
         pieces=(ConvexPiece(corners=((7.1, 2.2), (7.4, 2.1), (7.5, 2.9)), checked_m=0.31),),
         rings=(Ring(center=(2.5, 1.5), inner_m=4.93, outer_m=5.33),),
         rejections=0,
+        anchor=(4.0, 2.5),
+        slack_m=0.24,
     ),
 )
 
