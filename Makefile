@@ -33,7 +33,7 @@ fuzz: $(READY)
 	-@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --require-hashes \
 		--requirement tests/campaigns/fuzzer.lock
 	$(BIN)/python -m tests.campaigns.fuzz
-	@if $(BIN)/python -c 'import atheris' 2>/dev/null; then $(BIN)/python -m tests.campaigns.fuzz --guided; \
+	@if $(BIN)/python -c 'import atheris' 2>/dev/null; then $(BIN)/python -m tests.campaigns.guided_fuzz; \
 		else echo "atheris is not installed: no guided inputs"; fi
 
 docs: $(READY)

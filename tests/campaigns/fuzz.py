@@ -6,8 +6,6 @@
 Every peer lives for some thousand inputs in virtual time; then it must still say that it lives, must not have failed on
 anything, must have counted what it did not hear, and must not have grown or logged without bound. The campaign ends
 with status 1 and prints seed, input and traceback if one of that does not hold.
-
-With ``--guided`` the inputs come from atheris, if it is installed: libFuzzer, guided by which lines of the peer run.
 """
 
 from __future__ import annotations
@@ -19,8 +17,6 @@ import time
 import traceback
 from collections import Counter
 from collections.abc import Iterable
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Final, Literal
 
 from agents.casting import Casting
@@ -31,8 +27,7 @@ from agents.shell import MAXIMUM_OPERATORS, PeerShell
 from planning.environment import Environment
 from protocol.bus import BusEvent, Received
 from protocol.keys import Address
-from protocol.messages import BODIES, decode
-from protocol.schemas import example_payloads
+from protocol.messages import decode
 from tests.campaigns.arbitrary_messages import Mischief
 
 NAMES: Final = ("base", "agent", "robot1", "robot2")
@@ -184,37 +179,6 @@ def fuzz(inputs: int, first_seed: int, casting: Casting, names: Iterable[str] = 
     return complaints
 
 
-def fuzz_guided(inputs: int, casting: Casting) -> None:
-    """The same with inputs of atheris. Ends the process."""
-    import atheris
-
-    order, lives = list(BODIES), {name: Life(casting, name) for name in NAMES[:3]}
-    given = 0
-
-    def once(data: bytes) -> None:
-        nonlocal given
-        given += 1
-        name = NAMES[given % 3]
-        if given % LIFE < 3:
-            lives[name] = Life(casting, name)
-        kind = order[data[0] % len(order)] if data else "state"
-        speaker = NAMES[data[1] % 4] if len(data) > 1 else "robot1"
-        lives[name].give(Received(Address("team", speaker, kind, operator=kind == "goal").key, data[2:]))
-        if lives[name].shell.traceback:
-            raise AssertionError(f"{name} failed:\n{lives[name].shell.traceback}")
-
-    with TemporaryDirectory() as corpus:
-        for kind, payload in example_payloads().items():
-            sender = decode(payload).sender
-            first = bytes([order.index(kind), NAMES.index(sender) if sender in NAMES else 0])
-            (Path(corpus) / kind).write_bytes(first + payload)
-        atheris.instrument_all()
-        atheris.Setup(
-            [sys.argv[0], f"-runs={inputs}", "-max_len=4096", "-verbosity=0", "-print_final_stats=1", corpus], once
-        )
-        atheris.Fuzz()
-
-
 def resident_mb() -> float:
     """The most memory that this process has had, MB."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
@@ -225,12 +189,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--inputs", type=int, default=1_000_000)
     parser.add_argument("--seed", type=int, default=0, help="of the first peer")
-    parser.add_argument("--guided", action="store_true", help="with atheris")
     options = parser.parse_args()
     casting = make_casting()
-    if options.guided:
-        fuzz_guided(options.inputs, casting)
-        return 0
     begun = time.perf_counter()
     fuzz(options.inputs // 10, options.seed + 1_000_000, casting)  # what is loaded and cached on first use is there now
     before_mb = resident_mb()
