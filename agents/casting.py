@@ -169,6 +169,7 @@ class Casting:
             agent_name=mission.tracked_agent.name,
             robot_speed_m_s=mission.robot_speed_m_s,
             agent_speed_m_s=mission.agent_speed_m_s,
+            range_bound_m=mission.ranging.bound_m,
         )
 
     def _space(self, radius_m: float, start: Point) -> CompiledMap:
