@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from functools import cache
 from itertools import combinations, pairwise, product
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,7 @@ def sightline(*arguments: str) -> Result:
     return CliRunner().invoke(app, list(arguments))
 
 
+@cache
 def answer(*arguments: str) -> dict[str, Any]:
     result = sightline(*arguments, "--json")
     assert result.exit_code in (0, 2), (result.output, result.exception)
@@ -312,8 +314,8 @@ def test_links_name_agents_by_number_and_leave_out_robots_that_may_idle() -> Non
 @pytest.mark.parametrize("movement", ["geodesic", "euclidean", "adjacency"])
 def test_ways_lead_where_robots_go_and_are_as_long_as_they_cost(movement: str, tmp_path: Path) -> None:
     starts = [word for x in (12, 13, 14, 15, 16) for word in ("--robot", f"{x},36")]
-    arguments = [*ROOM3, *starts, "--placements", "cells", "--movement", movement, "--picture", str(tmp_path / "p.png")]
-    plan = answer(*arguments)
+    drawn = ["--picture", str(tmp_path / "p.png")] if movement == "adjacency" else []
+    plan = answer(*ROOM3, *starts, "--placements", "cells", "--movement", movement, *drawn)
     free = Environment.load(plan["map"]).inflated(plan["robot_radius_m"]).polygon.buffer(1e-6)
     total = 0.0
     for robot in plan["robots"]:
