@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from agents.mission import Mission
-from agents.sighted_set import Sight, SightedSet
+from agents.sighted_set import Sight, SightedSet, Sighting
 from estimation.range_log import Heard, Key, TimedRange
 from estimation.shared_ranges import Base, Digest
 from estimation.tight_set import TightSet
@@ -59,7 +59,7 @@ def base_to_wire(base: Base[SightedSet]) -> RangeBase:
     """A base as it is said, exactly."""
     time_s, source, number = base.key
     owner, start = _parts(source)
-    held = base.state.tight.snapshot()
+    held, seen = base.state.tight.snapshot(), base.state.seen
     return RangeBase(
         time_s=time_s,
         owner=owner,
@@ -71,6 +71,8 @@ def base_to_wire(base: Base[SightedSet]) -> RangeBase:
         pieces=tuple(ConvexPiece(corners=piece.corners, checked_m=piece.checked_m) for piece in held.pieces),
         rings=tuple(Ring(center=(x, y), inner_m=inner, outer_m=outer) for x, y, inner, outer in held.annuli),
         rejections=held.rejections,
+        anchor=None if seen is None else seen.anchor,
+        slack_m=0.0 if seen is None else seen.slack_m,
     )
 
 
@@ -121,6 +123,7 @@ class Vetting:
             and self._has_come(said.time_s, now_s)
             and self._counted(said.number, said.time_s)
             and self._is_near(said.origin, reach_m)
+            and (said.anchor is None or self._is_near(said.anchor, 0.0))
             and all(self._is_near(corner, reach_m) for corner in corners)
             and len(self._heard(said.heard, said.time_s)) == len(said.heard)
         )
@@ -138,8 +141,8 @@ class Vetting:
         except ValueError:
             return None
         key: Key = (said.time_s, source_of(said.owner, said.start), said.number)
-        state = SightedSet(self._sight, tight)
-        return Base(key, state, self._heard(said.heard, said.time_s), said.fingerprint)
+        seen = None if said.anchor is None else Sighting(tight, said.anchor, said.slack_m)
+        return Base(key, SightedSet(self._sight, tight, seen), self._heard(said.heard, said.time_s), said.fingerprint)
 
     def _heard(self, said: tuple[HeardRanges, ...], now_s: float) -> dict[str, Heard]:
         return {

@@ -77,7 +77,6 @@ class SharedEstimate:
     def __init__(
         self, mission: Mission, name: str, incarnation: int, sight: Sight, *, horizon_s: float = HORIZON_S
     ) -> None:
-        self._sight = sight
         self._vetting = Vetting(mission, sight)
         voters = [entry.name for entry in mission.roster if entry.role != "tracked_agent"]
         self._ranges: SharedRanges[SightedSet] = SharedRanges(
@@ -138,13 +137,13 @@ class SharedEstimate:
 
     def target(self, now_s: float) -> TargetSet | None:
         """Where the agent may be, as this peer knows; None before it has heard of any range."""
-        held = self._ranges.state_at(now_s).tight
-        return replace(self._sight.sketch(held), time_s=now_s, newest_s=self._newest_s) if held.started else None
+        sketch = self._ranges.state_at(now_s).sketch
+        return None if sketch is None else replace(sketch, time_s=now_s, newest_s=self._newest_s)
 
     def contains(self, point: Point, now_s: float) -> bool:
         """Whether the agent may be at a point; anywhere before any range."""
-        held = self._ranges.state_at(now_s).tight
-        return not held.started or bool(shapely.dwithin(self._sight.left(held), shapely.Point(point), TOLERANCE_M))
+        region = self._ranges.state_at(now_s).region
+        return region is None or bool(shapely.dwithin(region, shapely.Point(point), TOLERANCE_M))
 
     @property
     def ranges(self) -> SharedRanges[SightedSet]:

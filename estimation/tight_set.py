@@ -193,6 +193,11 @@ class TightSet:
         return self._rule.held is not None
 
     @property
+    def rejections(self) -> int:
+        """Ranges in a row that contradicted the set and were left out, as rejecting rules count them."""
+        return self._rejecting().rejections
+
+    @property
     def _union(self) -> _Union:
         if self._rule.held is None:
             raise NothingMeasured("no range has bounded the set yet: call measure() first, or ask `started`")
