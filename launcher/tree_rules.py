@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Sequence
 from typing import Final
 
 from agents.topology import TeamTree
 from launcher.simulated_peer import SimulatedPeer
 from launcher.violation import Violation
+from protocol.membership import Presence
 from protocol.messages import Confirmation, Deployment, Edge, Envelope, Topology, Tree, TreeNumber
 from protocol.negotiation import ROUNDS
 
@@ -21,11 +22,15 @@ class TreeRules:
     """See the module. What is confirmed is known from what the peers have said, not from what leaders believe.
 
     Args:
-        voters: who can confirm: base station and robots.
+        voters: who can confirm: base station and robots, in this order. The base station stands where everybody knows:
+            it is not asked by a leader to whom it is not there.
     """
 
-    def __init__(self, voters: Collection[str]) -> None:
+    def __init__(self, voters: Sequence[str]) -> None:
+        self._base = voters[0]
         self._voters = frozenset(voters)
+        self._asked: dict[TreeNumber, frozenset[str]] = {}
+        """By proposal: who has to confirm its links."""
         self._committed: dict[TreeNumber, Tree] = {}
         self._confirmed: dict[tuple[str, TreeNumber], frozenset[str]] = {}
         """By end and proposal: whom it sees, or will."""
@@ -43,6 +48,8 @@ class TreeRules:
             case Topology(committed=tree, proposal=proposal):
                 if proposal is not None and proposal.round >= ROUNDS:
                     raise Violation("proposals are bounded", f"{proposal.tree.number} is said {proposal.round} times")
+                if proposal is not None and proposal.tree.number not in self._asked:
+                    self._asked[proposal.tree.number] = self._voters - self._away(peer)
                 if tree is not None and self._committed.get(tree.number) != tree:
                     self._commit(tree)
             case Deployment():
@@ -62,6 +69,12 @@ class TreeRules:
         if self._committed.get(tree.number) != tree:
             raise Violation("links kept are of a tree in force", f"{peer.name} keeps {tree.edges}")
 
+    def _away(self, leader: SimulatedPeer) -> frozenset[str]:
+        """The base station, if it is not there as far as a leader knows."""
+        known = leader.allegiance
+        away = known is not None and leader.name != self._base and known.presence(self._base) is not Presence.PRESENT
+        return frozenset({self._base} if away else ())
+
     def _commit(self, tree: Tree) -> None:
         """A tree is said to be in force for the first time."""
         number = tree.number
@@ -72,7 +85,7 @@ class TreeRules:
         earlier = [known for other, known in self._committed.items() if other[0] == number[0] and other < number]
         kept = _links(max(earlier, key=lambda known: known.number).edges) if earlier else frozenset()
         for link in _links(tree.edges) - kept:
-            for end in link & self._voters:
+            for end in link & self._asked.get(number, self._voters):
                 (other,) = link - {end}
                 if other not in self._confirmed.get((end, number), ()):
                     text = f"{number} is in force, and {end} has not confirmed its link with {other}"

@@ -13,10 +13,11 @@ from agents.allegiance import Allegiance
 from agents.dispatcher import Dispatcher
 from agents.movement_authority import MovementAuthority
 from agents.robot import Robot
+from agents.shell import PeerShell
 from agents.stage_follower import StageFollower
 from protocol.ballot import Ballot
 from protocol.core import Persist
-from protocol.election import Election
+from protocol.election import LEASE_S, Election
 from protocol.held_tree import HeldTree
 from protocol.messages import Authority, Reign, Topology, Tree, Warrant
 from protocol.negotiation import Negotiation
@@ -135,20 +136,9 @@ def is_elected_by_a_minority(patch: Patch) -> None:
 
 @_mutant
 def leads_on_when_its_lease_has_ended(patch: Patch) -> None:
-    """Looks at the clock when it is woken only."""
-    patch.setattr(Election, "leads", lambda self, _now_s: self.office is not None)
-
-
-@_mutant
-def leaves_office_free(patch: Patch) -> None:
-    """Forgets its promise to itself when its lease has ended, although robots may still obey it."""
-    leave = Election._leave_office
-
-    def leave_free(self: Any, reason: str) -> None:
-        leave(self, reason)
-        self._voter.runs_until_s = -math.inf
-
-    patch.setattr(Election, "_leave_office", leave_free)
+    """Takes its lease for half as long again as it was promised."""
+    held_until_s = Ballot.held_until_s.fget
+    patch.setattr(Ballot, "held_until_s", property(lambda self: held_until_s(self) + 0.5 * LEASE_S))
 
 
 @_mutant
@@ -170,24 +160,14 @@ def judges_validity_on_arrival(patch: Patch) -> None:
 
 
 @_mutant
-def obeys_whom_it_has_not_promised(patch: Patch) -> None:
-    """Obeys every leader that shows a warrant, whomever it has promised its vote."""
-    begin = Obedience.__init__
-
-    def begin_free(self: Any, name: str, incarnation: int, lease_s: float, _voter: Any) -> None:
-        begin(self, name, incarnation, lease_s, None)
-
-    patch.setattr(Obedience, "__init__", begin_free)
-
-
-@_mutant
 def ignores_the_sequence(patch: Patch) -> None:
-    """Takes orders of one leader in the order in which they arrive."""
+    """Takes messages in the order in which they arrive."""
 
     def take(self: Any, _kind: str, _authority: Authority, reign: Reign, warrant: Warrant, now_s: float) -> Any:
         return self.heed(reign, warrant, now_s)
 
     patch.setattr(Obedience, "take", take)
+    patch.setattr(PeerShell, "_is_news", lambda _self, _address, _envelope: True)
 
 
 @_mutant

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
+from random import Random
 from typing import Any, Final
 
 import numpy as np
@@ -34,7 +35,8 @@ LINK_M: Final = 5.0
 """Relays are to be no farther apart than this."""
 KEPT_M: Final = 1.0
 """Places that are off by less are kept."""
-STAGE_M: Final = 0.5
+STAGES_M: Final = (0.5, 0.5, 0.15)
+"""Lengths of stages; short ones are released several at a time."""
 
 
 class OpenRoom(Environment):
@@ -69,6 +71,7 @@ class LightPlanner:
     def __init__(self, mission: Mission) -> None:
         self._base, self._agent = mission.base_station, mission.tracked_agent.name
         self._speed_m_s = mission.robot_speed_m_s
+        self._stage_m = Random(f"{mission.seed}/stages").choice(STAGES_M)
 
     def prepare(self) -> None:
         """Nothing is wanted."""
@@ -112,7 +115,7 @@ class LightPlanner:
     ) -> Motion:
         goals = {name: goals.get(name, place) for name, place in starts.items()}
         longest_m = max(math.dist(place, goals[name]) for name, place in starts.items())
-        stages = max(1, math.ceil(longest_m / STAGE_M))
+        stages = max(1, math.ceil(longest_m / self._stage_m))
         ways = [self._way(name, place, goals[name], stages) for name, place in starts.items()]
         ways += [
             structs.replace(self._way(name, _point(way[0]), _point(way[-1]), stages), scheduled=False)
