@@ -205,7 +205,8 @@ class Supervisor:
         how = f"was killed by {signal.Signals(-status).name}" if status < 0 else f"ended with status {status}"
         if status == WOULD_JOIN_WRONGLY:
             peer.given_up = True
-            self._crashed(peer.name, f"{peer.name} must not join as things are: given up; see {self.log(peer)}")
+            said = self.log(peer).read_text(encoding="utf-8", errors="replace").rstrip().rpartition("\n")[2]
+            self._crashed(peer.name, f"{said}; given up")
             return None
         if len(peer.crashes) > RESTARTS:
             peer.given_up = True

@@ -13,6 +13,7 @@ import pytest
 
 from agents.leader import DeploymentPlanner
 from agents.mission import Mission
+from agents.runtime import WOULD_JOIN_WRONGLY
 from agents.voter_file import VoterFile
 from launcher import supervisor as supervision
 from launcher.processes import spawn
@@ -87,6 +88,23 @@ def test_what_crashes_is_restarted_with_the_next_incarnation_until_it_is_given_u
     assert len(said) == 1 + supervision.RESTARTS
     assert "given up" in said[-1]
     assert "robot1.log" in said[-1]
+
+
+def test_who_must_not_join_is_given_up_at_once_and_its_sentence_is_passed_on(
+    rehearse: Callable[[dict[str, str]], tuple[Rehearsal, list[str]]], tmp_path: Path
+) -> None:
+    refusal = f"import sys; print('robot1 does not join: its file is bad; mend it'); sys.exit({WOULD_JOIN_WRONGLY})"
+    team, said = rehearse({"robot1": refusal})
+
+    async def play() -> None:
+        team.launch()
+        team.watch()
+        await until(lambda: team.peers["robot1"].given_up)
+        await team.stop()
+
+    asyncio.run(play())
+    assert said == ["robot1 does not join: its file is bad; mend it; given up"]
+    assert team.peers["robot1"].incarnation == 0
 
 
 def test_a_killed_process_is_named_with_its_signal_and_comes_back(
