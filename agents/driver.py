@@ -1,12 +1,13 @@
 """The seam to a body: where it is, and how it shall move.
 
-A real robot implements :class:`RobotDriver` over its own drive; :class:`DiscDriver` is the body built in. Ranges to
-other radios join the seam as ``ranges()`` together with the ranging that uses them.
+A real robot implements :class:`RobotDriver` over its own drive and radio; :class:`DiscDriver` is the body built in.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 from planning.environment import Environment
@@ -18,6 +19,16 @@ def patience_s(control_hz: float) -> float:
     return max(0.5, 3.0 / control_hz)
 
 
+@dataclass(frozen=True, slots=True)
+class Ranged:
+    """A radio of this body has measured how far the tracked agent is from where the body was then."""
+
+    anchor: Point
+    range_m: float
+    bound_m: float
+    """The distance to where the agent is by now is within this of ``range_m``: what it can have walked since counts."""
+
+
 class RobotDriver(Protocol):
     """A body in the plane."""
 
@@ -26,6 +37,9 @@ class RobotDriver(Protocol):
 
     def pose(self) -> Point:
         """Where the body is: metres, map frame."""
+
+    def ranges(self) -> Sequence[Ranged]:
+        """What its radio has measured since this was asked last. Of agents in line of sight only."""
 
     def drive(self, velocity: Point, for_s: float) -> None:
         """Move at ``velocity`` (m/s, map frame) for at most ``for_s``, then stand: a mind that hangs drives no body."""
@@ -64,6 +78,10 @@ class DiscDriver:
     def pose(self) -> Point:
         """Where the centre of the disc is at the time it was last advanced to."""
         return self._position
+
+    def ranges(self) -> Sequence[Ranged]:
+        """Nothing: the radio built in is the agent's process, which is asked over the bus (:mod:`agents.ranging`)."""
+        return ()
 
     def drive(self, velocity: Point, for_s: float) -> None:
         """Replace the command, from the time it was last advanced to."""

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, Final, Protocol, TypeAlias
 
+from agents.driver import Ranged
 from agents.records import AnyRecord
 from protocol.bus import PeerAppeared, PeerVanished
 from protocol.core import Persist, Written
@@ -19,8 +20,8 @@ from protocol.keys import Address
 from protocol.messages import AnyBody, Envelope, Point
 
 __all__ = [
-    "RETRY_S", "Compute", "Drive", "Effect", "Event", "Heard", "JobDone", "Persist", "Publish", "Record", "Role",
-    "WakeAt", "Woken", "Written",
+    "RETRY_S", "Compute", "Drive", "Effect", "Event", "Heard", "JobDone", "Persist", "Publish", "Ranged", "Record",
+    "Role", "WakeAt", "Woken", "Written",
 ]  # fmt: skip
 
 
@@ -53,7 +54,7 @@ class JobDone:
     failure: str = ""
 
 
-Event: TypeAlias = Woken | Heard | JobDone | Written | PeerAppeared | PeerVanished
+Event: TypeAlias = Woken | Ranged | Heard | JobDone | Written | PeerAppeared | PeerVanished
 """``Written`` tells what became of a ``Persist``; both are those of :mod:`protocol.core`."""
 
 

@@ -25,6 +25,7 @@ from agents.role import (
     JobDone,
     Persist,
     Publish,
+    Ranged,
     Record,
     Role,
     WakeAt,
@@ -133,6 +134,8 @@ class PeerShell:
         now_s = self._now()
         self.wake_at_s = math.inf
         self._driver.advance(now_s)
+        for ranged in self._driver.ranges():
+            self._tell(ranged, now_s)
         self._tell(Woken(self._driver.pose()), now_s)
         if self.wake_at_s == math.inf:
             self.wake_at_s = now_s + RETRY_S
@@ -234,5 +237,7 @@ def _describe(event: Event) -> str:
             return "the end of writing"
         case PeerAppeared(peer) | PeerVanished(peer):
             return f"the coming or going of {peer}"
+        case Ranged():
+            return "a range"
         case Woken():
             return "waking up"

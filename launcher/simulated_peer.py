@@ -7,7 +7,7 @@ inline and lets the result wait for its delay.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from copy import copy
 from random import Random
 from typing import TYPE_CHECKING, Final, TypeVar
@@ -22,7 +22,7 @@ from protocol.promises import decode_promise
 
 if TYPE_CHECKING:
     from agents.casting import Casting
-    from agents.driver import DiscDriver
+    from agents.driver import DiscDriver, Ranged
     from agents.mission import Mission
     from protocol.messages import Point
     from protocol.simulated_bus import SimulatedNetwork, VirtualTime
@@ -359,6 +359,9 @@ class _TrueBody:
 
     def pose(self) -> Point:
         return self._body.pose()
+
+    def ranges(self) -> Sequence[Ranged]:
+        return self._body.ranges()
 
     def drive(self, velocity: Point, for_s: float) -> None:
         for_s = min(for_s, for_s / self._clock.rate)
