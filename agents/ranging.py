@@ -8,8 +8,7 @@ since. The agent measures at some moment between the question and the answer, so
 most v times the round trip from where it was: by so much the bound is wider, for a range stamped at that moment. What
 comes after :data:`LATE_S` is worth little and is left out.
 
-A real radio measures by itself; its driver says so by :class:`~agents.role.Ranged`, and nothing of this crosses the
-wire.
+A real radio measures by itself: :meth:`agents.driver.RobotDriver.ranges` says what, and the questions find no answer.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from typing import Final
 
 from agents.mission import Mission
 from agents.rhythm import Rhythm
-from agents.role import Effect, Event, Heard, Publish, Woken
+from agents.role import Effect, Event, Heard, Publish, Ranged, Woken
 from agents.shared_estimate import SharedEstimate
 from planning.environment import Environment
 from protocol.messages import Point, RangeReply, RangeRequest
@@ -61,8 +60,10 @@ class Ranging:
         return self._asking.next_s
 
     def handle(self, event: Event, now_s: float) -> Iterable[Effect]:
-        """Ask when it is time; take the answers to the last questions."""
+        """Ask when it is time; take the answers to the last questions, and what a radio of this body's own says."""
         match event:
+            case Ranged(anchor, range_m, bound_m):
+                return self._estimate.measured(anchor, range_m, bound_m, now_s)
             case Woken(position) if self._asking.due(now_s):
                 return (self._ask(position, now_s),)
             case Heard(address, envelope) if isinstance(envelope.body, RangeReply):

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec import structs
 
+from agents.driver import DiscDriver, Ranged
 from agents.mind import Mind
 from agents.ranging import LATE_S, MOST_OPEN, Ranging, Transponder
 from agents.role import Effect, Heard, Publish, Woken
 from agents.shared_estimate import SharedEstimate
+from agents.shell import PeerShell
 from protocol.keys import Address
-from protocol.messages import AnyBody, Envelope, Point, RangeReply, RangeRequest, Ranges, kind_of
+from protocol.messages import AnyBody, Envelope, Point, RangeReply, RangeRequest, Ranges, decode, kind_of
 from tests.agents.estimate_team import CORNER, LightCasting, make_mission
 
 MISSION = make_mission(1)
@@ -153,3 +156,29 @@ def test_a_mind_of_an_agent_that_does_not_announce_says_only_ranges_and_that_it_
     assert [time_s for time_s, body in life.said if isinstance(body, RangeReply)] == [2.0], "answered at once"
     tracks = [record for record in life.records if hasattr(record, "position")]
     assert len(tracks) > 40, "its place goes into the recording"
+
+
+def test_what_a_radio_of_the_body_measures_is_shared_too() -> None:
+    class Radio(DiscDriver):
+        def ranges(self) -> Sequence[Ranged]:
+            return (Ranged((2.0, 4.0), 2.83, 0.25),)
+
+    part, estimate = asker()
+    heard_by_others: list[AnyBody] = []
+
+    class Bus:
+        def publish(self, key: str, payload: bytes) -> None:
+            heard_by_others.append(decode(payload).body)
+
+        def close(self) -> None: ...
+
+    shell = PeerShell(
+        Mind([part]), Radio((2.0, 4.0), 1.0), Bus(), name="robot1", team="team", incarnation=0,
+        peers=[entry.name for entry in MISSION.roster], now=lambda: 1.0, wall_clock=lambda: 1.0,
+        record=lambda _, record: pytest.fail(f"{record}"), execute=pytest.fail, persist=pytest.fail,
+    )  # fmt: skip
+    shell.start()
+    shell.wake()
+    (record,) = estimate.ranges.log
+    assert (record.time_s, record.anchor, record.range_m, record.bound_m) == (1.0, (2.0, 4.0), 2.83, 0.25)
+    assert any(isinstance(body, Ranges) for body in heard_by_others) and not shell.faults
