@@ -25,7 +25,7 @@ from typing import Final
 
 from msgspec import structs
 
-from agents.records import AnyRecord, Decision, Track
+from agents.records import AnyRecord, Decision, Ordered, Track
 from launcher.fault_timetable import Fault, Kill, Loss, Partition, Pause, Timetable, write_timetable
 from launcher.reigns import Reigns, find_reigns
 from launcher.review import read_records
@@ -149,22 +149,29 @@ def _take_over(
 
 
 def lose_robots(outcome: Outcome, run_team: Callable[[Sequence[Fault], float], Run], trials: int) -> None:
-    """A robot is killed; how long until a leader has decided on a deployment without it."""
+    """A robot is killed; how long until the others have a motion without it."""
     robots = [f"robot{1 + trial % 4}" for trial in range(trials)]
     done = run_team(_spread([Kill(at_s=0.0, for_s=2.0, who=robot) for robot in robots], 11.0), BEGIN_S + 11.0 * trials)
     outcome.missed += done.reigns.broken
     for at_s, mishap in done.reigns.mishaps:
-        without_it = [
-            time_s
-            for time_s, _, record in done.records
-            if isinstance(record, Decision)
-            and time_s >= at_s
-            and mishap.who[0] not in {placement.robot for placement in record.deployment.placements}
-        ]
-        if mishap.kind == "kill" and without_it:
-            outcome.took_s.append(without_it[0] - at_s)
-        else:
-            outcome.missed.append(f"{mishap.text} at {at_s:.2f} s, and no decision without it")
+        if mishap.kind == "kill" and mishap.text.startswith("nothing done"):
+            outcome.void += 1
+        elif mishap.kind == "kill":
+            re_formed_s = find_motion_without(done.records, mishap.who[0], at_s)
+            if re_formed_s is None:
+                outcome.missed.append(f"{mishap.text} at {at_s:.2f} s, and no motion without it")
+            else:
+                outcome.took_s.append(re_formed_s - at_s)
+
+
+def find_motion_without(records: Records, robot: str, from_s: float) -> float | None:
+    """When the first motion was ordered in which a robot has no part, though its body may be in the way."""
+    for time_s, _, record in records:
+        if not isinstance(record, Ordered) or time_s < from_s:
+            continue
+        if all(way.member != robot or not way.scheduled for way in record.motion.ways):
+            return time_s
+    return None
 
 
 def part_teams(outcome: Outcome, run_team: Callable[[Sequence[Fault], float], Run], trials: int) -> None:
@@ -232,7 +239,7 @@ def _spread(faults: Sequence[Fault], every_s: float) -> list[Fault]:
 KINDS: Final = {
     "kill": (lose_leaders, Outcome("leader killed → a new one obeyed by all others", 1.2, 2.0)),
     "pause": (hang_leaders, Outcome("leader paused → a new one obeyed by all others", 1.5, 2.5)),
-    "robot": (lose_robots, Outcome("robot killed → a deployment without it", None, None)),
+    "robot": (lose_robots, Outcome("robot killed → the others ordered on without it", None, None)),
     "partition": (part_teams, Outcome("2 of 5 cut off, link back → one leader obeyed by all", 3.0, 3.0)),
 }
 
