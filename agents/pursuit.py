@@ -46,14 +46,14 @@ AHEAD_S: Final = 1.0
 ANCHORS: Final = 2
 """Ranges of so many of the last relays count as certain."""
 
-UNSEEN: Final = 1.0
-"""A place that sees nothing of the set is as bad as one that leaves all of it, and this share of it once more."""
+HALVING_M: Final = 3.0
+"""To leave half as much of the set is worth driving so many metres."""
 
-WAY_M: Final = 8.0
-"""To leave all of the set is as bad as to drive so far."""
+UNSEEN_M: Final = 8.0
+"""To see nothing of the set is as bad as to drive so many metres."""
 
-SETTLED: Final = 0.1
-"""Share of the set that must be won by going to another place than before."""
+SETTLED_M: Final = 0.8
+"""Another place than before must be better by so much."""
 
 
 class Pursuit:
@@ -134,11 +134,11 @@ class Pursuit:
         stops = np.stack([np.concatenate([np.reshape(anchors, (-1, 2)), place[None]]) for place in places])
         left = predict_shares(points, stops, self._bound_m, False)
         seen = np.array([self._sight(place, points) for place in places])
-        costs = seen * left + (1.0 - seen) * (1.0 + UNSEEN)
-        costs += self._geodesics.lengths(robot, places) / WAY_M
+        costs_m = HALVING_M * seen * np.log2(left) + UNSEEN_M * (1.0 - seen)
+        costs_m += self._geodesics.lengths(robot, places)
         if before is not None:
-            costs -= SETTLED * (np.hypot(*(places - np.array(before)).T) == 0.0)
-        x, y = places[int(np.argmin(costs))].tolist()
+            costs_m -= SETTLED_M * (np.hypot(*(places - np.array(before)).T) == 0.0)
+        x, y = places[int(np.argmin(costs_m))].tolist()
         return x, y
 
     def _sight(self, place: Point | Floats, points: Floats) -> float:
