@@ -30,21 +30,24 @@ class PlainGroup(TyperGroup):
         except _UNREADABLE as problem:
             # Without a command the help has been printed, and there is nothing to add.
             if type(problem).__name__ != "NoArgsIsHelpError":
-                complain(describe(problem))
+                words = settings.get("args") or [*arguments, sys.argv[1:]][0] or ()
+                named = [word for word in words[:1] if word in self.commands]
+                complain(describe(problem, " ".join(["sightline", *named])))
             sys.exit(BAD_INPUT)
         except typer.Abort:
             sys.exit(1)
         sys.exit(status)
 
 
-def describe(problem: Any) -> str:
+def describe(problem: Any, asked: str = "sightline") -> str:
     """What cannot be read, why, and what to do, in a sentence.
 
     Args:
+        asked: the command; some problems do not tell.
         problem: typer's; what it does not tell of itself is made up for by the help that is pointed to.
     """
     context, parameter = getattr(problem, "ctx", None), getattr(problem, "param", None)
-    command = "sightline" if context is None else context.command_path
+    command = asked if context is None else context.command_path
     asking = f"see {command} --help"
     if parameter is None:
         text = problem.message.removesuffix(".").replace(". Did", "; did")

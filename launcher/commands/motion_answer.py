@@ -43,12 +43,13 @@ def tell_motion(planned: PlannedMotion) -> None:
         f"{motion.length_m:.1f} m driven, {motion.geodesic_m:.1f} m by shortest ways; "
         f"{counted(schedule.stage_count, 'stage')}"
     )
-    kept = ", ".join(planned.joined)
-    network = f"{kept} are one network throughout" if len(planned.joined) > 1 else "before, the base sees nobody"
-    if planned.certificate.valid:
-        tell(f"  certified {network}, and no discs overlap, whoever is late")
-    else:
+    if not planned.certificate.valid:
         tell(f"  broken    for {motion.break_s:.1f} s: {planned.certificate.violations[0].text}")
+    elif len(planned.joined) > 1:
+        kept = ", ".join(planned.joined)
+        tell(f"  certified {kept} are one network throughout, and no discs overlap, whoever is late")
+    else:
+        tell("  certified no discs overlap, whoever is late; nothing of sight, as the base sees nobody before")
     for move in planned.moves[:LISTED]:
         tell(_tell_move(move, planned.team.names))
     if len(planned.moves) > LISTED:

@@ -27,14 +27,14 @@ def find_crowds(request: Request, facts: dict[str, Any]) -> list[list[str]]:
     """Who would stand nearer to each other than two robots fit: groups of names with a robot in each.
 
     Placements may be shared, and may lie where somebody stands already: a plan counts robots and says what they see,
-    and leaves it to them to keep apart.
+    and leaves it to them to keep apart. The base station has no body, and is in nobody's way.
     """
     agents = _named_agents(request)
-    standing = [("base", request.base), *agents, *_named_relays(request, facts)]
+    standing = [*agents, *_named_relays(request, facts)]
     apart_m = max(2 * request.placements.radius_m, 1e-6)
     group = list(range(len(standing)))
     for one, (_, place) in enumerate(standing):
-        for other in range(max(one + 1, 1 + len(agents)), len(standing)):
+        for other in range(max(one + 1, len(agents)), len(standing)):
             if math.dist(place, standing[other][1]) < apart_m and group[one] != group[other]:
                 joined, gone = sorted((group[one], group[other]))
                 group = [joined if number == gone else number for number in group]

@@ -166,7 +166,7 @@ def test_plan_takes_negative_places_and_geojson(tmp_path: Path) -> None:
         ),
         (["plan"], ["plan needs MAP; see", "plan --help"]),
         (["plan", "room1"], ["plan needs --base X,Y; see"]),
-        (["plan", "room1", "--base"], ["--base", "requires an argument; see"]),
+        (["plan", "room1", "--base"], ["--base", "requires an argument; see sightline plan --help"]),
         (["plan", "room1", "room2", "--base", "5,10", "--agent", "8,10"], ["unexpected extra argument", "room2"]),
         (["map", "--rdius", "1"], ["--rdius", "did you mean --radius?"]),
         (["map", "--json=yes"], ["'--json' does not take a value; see"]),

@@ -91,6 +91,16 @@ def test_a_team_that_has_to_part_is_told_and_ends_with_2(monkeypatch: pytest.Mon
     assert facts["between"] is not None
 
 
+def test_of_a_base_that_sees_nobody_nothing_is_said_to_be_certified() -> None:
+    places = ("75,35", "76,33", "70,12", "49,9", "60,6")
+    robots = [word for place in places for word in ("--robot", place)]
+    result = sightline("plan", "room3", "--base", "10,36", "--agent", "70,10", *robots)
+    assert (
+        "\n  certified no discs overlap, whoever is late; nothing of sight, as the base sees nobody before\n"
+        in result.stdout
+    )
+
+
 def test_robots_that_are_sent_to_one_place_stand_beside_each_other() -> None:
     places = ("12,36", "31,33", "35,15", "60,6", "62,6", "63,7")
     robots = [word for place in places for word in ("--robot", place)]

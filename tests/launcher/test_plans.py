@@ -343,6 +343,7 @@ def test_robots_that_would_stand_in_one_place_are_told() -> None:
     assert {frozenset(pair) for crowd in plan["crowds"] for pair in combinations(crowd, 2)} == close
     assert "Too near: robot" in sightline(*ROOM3, *robots, "--mu", "50").stdout
     assert answer(*ROOM3)["crowds"] == []
+    assert answer(*ROOM3, *ROBOTS, "--robot", "10.1,36", "--idle")["crowds"] == [], "the base station has no body"
 
 
 def test_relays_in_one_place_take_one_line() -> None:
