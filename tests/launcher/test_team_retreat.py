@@ -9,7 +9,8 @@ import numpy as np
 
 from agents.records import LogLine
 from agents.robot import SILENCE_S, Robot
-from launcher.fault_timetable import Fault, Kill, Pause
+from launcher.fault_timetable import Fault, Kill, Pause, Timetable
+from launcher.invariants import Invariants
 from planning.connectivity import connected
 from protocol.messages import State
 from tests.launcher.test_team_motion import Stage, office
@@ -23,7 +24,10 @@ BACK_S = LEADERLESS_S + 0.65 + 10.0
 
 
 def begin(*faults: Fault) -> Stage:
-    return Stage(3, *FEWER, *faults)
+    """With all invariants looked for: also that nobody goes back out of turn, or moves otherwise without a leader."""
+    stage = Stage(3, *FEWER, *faults)
+    Invariants(stage.mission, stage.team, Timetable(faults=(*FEWER, *faults)))
+    return stage
 
 
 def body(stage: Stage, name: str) -> State:
@@ -100,7 +104,7 @@ def test_a_leader_that_comes_back_begins_afresh_from_where_they_are() -> None:
 
 
 def test_a_robot_that_is_cut_off_alone_holds() -> None:
-    stage = Stage(3, *FEWER, *(Kill(at_s=LEADERLESS_S, who=who) for who in ("base", "robot2")))
+    stage = begin(*(Kill(at_s=LEADERLESS_S, who=who) for who in ("base", "robot2")))
     stage.run(LEADERLESS_S + 1.0)
     stands = stage.team.peers["robot1"].place
     stage.run(BACK_S + 5.0)
