@@ -9,6 +9,7 @@ from typing import Any, Final, TypeAlias
 import pytest
 from msgspec import structs
 
+from agents import dispatcher
 from agents.allegiance import Allegiance
 from agents.dispatcher import Dispatcher
 from agents.movement_authority import MovementAuthority
@@ -137,7 +138,7 @@ def is_elected_by_a_minority(patch: Patch) -> None:
 @_mutant
 def leads_on_when_its_lease_has_ended(patch: Patch) -> None:
     """Takes its lease for half as long again as it was promised."""
-    held_until_s = Ballot.held_until_s.fget
+    held_until_s: Any = Ballot.__dict__["held_until_s"].fget
     patch.setattr(Ballot, "held_until_s", property(lambda self: held_until_s(self) + 0.5 * LEASE_S))
 
 
@@ -172,13 +173,15 @@ def ignores_the_sequence(patch: Patch) -> None:
 
 @_mutant
 def drives_on_when_it_obeys_nobody(patch: Patch) -> None:
-    """Tells its body to drive as long as patience lasts, whenever obedience may end."""
+    """Tells its body to drive whenever obedience may end. Much is released, so that it can."""
+    patch.setattr(dispatcher, "HORIZON_S", 10.0)
     patch.setattr(Allegiance, "obeyed_until_s", property(lambda _self: math.inf))
 
 
 @_mutant
 def begins_two_stages_ahead(patch: Patch) -> None:
-    """Waits for nobody."""
+    """Waits for nobody. Much is released, so that it can."""
+    patch.setattr(dispatcher, "HORIZON_S", 10.0)
     patch.setattr(StageFollower, "_keeps_back", lambda _self, _name, _stage: False)
 
 

@@ -1,0 +1,120 @@
+"""A short mission for each rule left out, in which that leads to harm, and which rule is then broken."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from launcher.fault_timetable import Cut, Delay, Disk, Fault, Kill, Loss, Partition
+from tests.faults.chaos_mission import ChaosCase
+
+
+def _case(ends_s: float, *faults: Fault, robots: int = 2, seed: int = 1, duration_s: float = 30.0) -> ChaosCase:
+    return ChaosCase(seed=seed, robots=robots, duration_s=duration_s, ends_s=ends_s, faults=faults)
+
+
+VOTERS = ("base", "robot1", "robot2")
+
+BLACKOUT: Final = tuple(Kill(at_s=4.0, for_s=1.0, who=name) for name in VOTERS)
+"""All die at once, and begin again."""
+
+OLD_VOTES: Final = (
+    Delay(at_s=3.0, hearers=("base",), least_s=0.6, mean_s=0.0),
+    Cut(at_s=5.0, speakers=("base",)),
+)
+"""Votes take long to the base station, which is then not heard any more: so the votes that come are old."""
+
+CASES: Final[dict[str, tuple[str, ChaosCase]]] = {
+    "skips_the_write": ("epochs rise", _case(8.0, *BLACKOUT)),
+    "says_before_it_is_written": (
+        "epochs rise",
+        _case(
+            6.0,
+            *(Disk(at_s=0.0, for_s=0.9, who=name, takes_s=1.5) for name in VOTERS),
+            *(Kill(at_s=1.0, for_s=0.5, who=name) for name in VOTERS),
+            seed=6,
+        ),
+    ),
+    "does_not_write_its_own_vote": (
+        "epochs rise",
+        _case(
+            8.0,
+            Partition(at_s=0.0, for_s=5.0, group=("robot2",)),
+            Kill(at_s=4.0, who="robot1"),
+            Kill(at_s=4.5, for_s=0.3, who="base"),
+        ),
+    ),
+    "ignores_the_epoch": (
+        "epochs rise",
+        _case(
+            4.0,
+            Kill(at_s=0.492, for_s=1.239, who="base", noticed_after_s=1.0),
+            Kill(at_s=0.994, for_s=0.174, who="leader"),
+            seed=55,
+            duration_s=17.0,
+        ),
+    ),
+    "ignores_its_promise": (
+        "one leads",
+        _case(
+            8.0,
+            Cut(at_s=3.0, speakers=("base",), hearers=("robot2",)),
+            Cut(at_s=3.0, speakers=("robot2",), hearers=("base",)),
+        ),
+    ),
+    "votes_at_once_after_a_restart": (
+        "one leads",
+        _case(
+            8.0,
+            Cut(at_s=3.0, speakers=("base",), hearers=("robot2",)),
+            Cut(at_s=3.0, speakers=("robot2",), hearers=("base",)),
+            *(Kill(at_s=5.0 + 0.4 * n, for_s=0.05, who="robot1") for n in range(6)),
+        ),
+    ),
+    "counts_the_lease_from_the_reply": ("one leads", _case(8.0, *OLD_VOTES)),
+    "counts_votes_of_any_round": ("one leads", _case(8.0, *OLD_VOTES)),
+    "is_elected_by_a_minority": ("one leads", _case(8.0, Partition(at_s=3.0, group=("base",)))),
+    "leads_on_when_its_lease_has_ended": (
+        "one leads",
+        _case(8.0, Partition(at_s=3.0, group=("base",))),
+    ),
+    "obeys_without_a_warrant": (
+        "no order is taken when its lease has ended",
+        _case(8.0, Delay(at_s=2.0, speakers=("base",), hearers=("robot1",), least_s=1.5, mean_s=0.0)),
+    ),
+    "judges_validity_on_arrival": (
+        "no order is taken when its lease has ended",
+        _case(8.0, Delay(at_s=2.0, speakers=("base",), hearers=("robot1",), least_s=1.5, mean_s=0.0)),
+    ),
+    "ignores_the_sequence": (
+        "no older order after a newer one",
+        _case(8.0, Delay(at_s=1.0, mean_s=0.1, overtaking=True)),
+    ),
+    "drives_on_when_it_obeys_nobody": (
+        "nobody moves who obeys nobody",
+        _case(14.0, *(Kill(at_s=at_s, who=name) for at_s, name in ((7.5, "base"), (7.5, "robot2")))),
+    ),
+    "begins_two_stages_ahead": ("nobody is two stages ahead", _case(26.0, robots=2)),
+    "goes_beyond_what_is_released": ("nobody goes beyond what is released", _case(12.0, robots=3)),
+    "releases_before_all_have_accepted": (
+        "nothing is released before all have accepted it",
+        _case(14.0, Loss(at_s=2.0, speakers=("base",), hearers=("robot1",), share=0.7), robots=3),
+    ),
+    "releases_links_first": ("links are released when their replacement is confirmed", _case(4.0)),
+    "trusts_its_predecessor": (
+        "links are released when their replacement is confirmed",
+        _case(20.0, *(Kill(at_s=at_s, for_s=2.0, who="leader") for at_s in (6.0, 11.0)), robots=4),
+    ),
+    "takes_a_proposal_for_the_tree": ("links kept are of a tree in force", _case(4.0)),
+    "goes_before_the_tree_is_in_force": ("nobody goes where another tree is needed", _case(4.0, seed=0)),
+    "keeps_proposals_open": (
+        "proposals are bounded",
+        _case(10.0, Cut(at_s=5.2, speakers=("robot1",), hearers=("base",)), robots=3),
+    ),
+    "never_stands": (
+        "a team is led soon after the last fault",
+        _case(12.0, Kill(at_s=3.0, for_s=0.5, who="leader")),
+    ),
+    "remembers_everything": ("memory is bounded", _case(26.0, robots=1)),
+    "fails_on_a_vanished_peer": ("roles fail on nothing", _case(4.0, Kill(at_s=3.0, who="agent"))),
+}
+"""By mutant: the rule that it breaks, and where."""

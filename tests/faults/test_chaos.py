@@ -1,0 +1,89 @@
+"""Missions in which much goes wrong break no rule; a rule left out on purpose is found out; failures are made small.
+
+The campaign (``make chaos``) runs ten thousand of them.
+"""
+
+from __future__ import annotations
+
+import pytest
+
+from agents.records import Office
+from launcher.fault_timetable import Kill, Loss, Partition
+from tests.faults.chaos import run_chaos
+from tests.faults.chaos_mission import ChaosCase, draw_case, read_case, write_case
+from tests.faults.chaos_mutants import MUTANTS
+from tests.faults.mutant_cases import CASES
+from tests.faults.shrinking import shrink
+
+SEEDS = range(1000, 1010)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_no_rule_is_broken(seed: int) -> None:
+    """Small teams, whose missions cost little."""
+    case = draw_case(seed, (2, 3), (12, 18))
+    verdict = run_chaos(case)
+    assert verdict.broken is None, f"{write_case(case)}\n{verdict.trace()}"
+
+
+def test_the_missions_are_hard() -> None:
+    """Several things go wrong in each; leaders are replaced, and the last one is obeyed after the last fault."""
+    assert all(len(draw_case(seed).faults) >= 8 for seed in range(100))
+    verdict = run_chaos(draw_case(1001, (2, 3), (14, 20)))
+    reigns = {record.leads for _, _, record in verdict.history if isinstance(record, Office)} - {None}
+    assert len(reigns) > 1
+    assert verdict.planned_after_s < 10.0
+
+
+@pytest.mark.parametrize("name", MUTANTS)
+def test_a_rule_left_out_is_found_out(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    rule, case = CASES[name]
+    healthy = run_chaos(case)
+    assert healthy.broken is None, healthy.trace()
+    MUTANTS[name](monkeypatch)
+    broken = run_chaos(case).broken
+    assert broken is not None, f"{name} is not found out"
+    assert broken.rule == rule
+
+
+def test_the_same_case_has_the_same_history_to_the_last_bit() -> None:
+    case = draw_case(7, (2, 2), (10, 12))
+    assert run_chaos(case).digest() == run_chaos(case).digest()
+    other = ChaosCase(seed=8, robots=case.robots, duration_s=case.duration_s, faults=case.faults)
+    assert run_chaos(case).digest() != run_chaos(other).digest()
+
+
+def test_cases_read_back_as_they_were_written() -> None:
+    for seed in range(50):
+        case = draw_case(seed)
+        assert read_case(write_case(case)) == case
+
+
+def test_a_failing_case_is_made_small(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of many faults only the one is left that leads to harm, and only the robots that it takes."""
+    MUTANTS["is_elected_by_a_minority"](monkeypatch)
+    case = ChaosCase(
+        seed=1,
+        robots=4,
+        duration_s=30.0,
+        faults=(
+            Loss(at_s=1.0, for_s=2.0, share=0.2),
+            Kill(at_s=1.5, for_s=1.0, who="robot4"),
+            Partition(at_s=4.0, for_s=5.0, group=("base", "robot1")),
+            Kill(at_s=9.5, for_s=1.0, who="agent"),
+        ),
+    )
+    before = run_chaos(case).broken
+    assert before is not None
+    small = shrink(case, lambda smaller: run_chaos(smaller, keep=False), most_runs=40)
+    verdict = run_chaos(small)
+    assert verdict.broken is not None
+    assert verdict.broken.rule == before.rule
+    assert len(small.faults) <= 1
+    assert small.robots < case.robots
+    assert "BROKEN" in verdict.trace(last=5)
+
+
+def test_what_breaks_no_rule_cannot_be_made_small() -> None:
+    with pytest.raises(ValueError, match="breaks no rule"):
+        shrink(ChaosCase(seed=1, robots=1, duration_s=2.0), run_chaos)
