@@ -168,6 +168,7 @@ def test_what_a_radio_of_the_body_measures_is_shared_too() -> None:
 
     class Bus:
         def publish(self, key: str, payload: bytes) -> None:
+            assert key.startswith("team/")
             heard_by_others.append(decode(payload).body)
 
         def close(self) -> None: ...
