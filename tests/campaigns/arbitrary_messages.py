@@ -6,6 +6,7 @@ So what is made is believed often enough to get past the first checks, and deep 
 
 from __future__ import annotations
 
+import copy
 import json
 from collections import deque
 from collections.abc import Collection, Sequence
@@ -155,7 +156,7 @@ class Mischief:
                 case 1 if isinstance(value, list):
                     value.extend(value[:] * self.chance.randrange(1, 200 // len(value) + 2))
                 case _:
-                    value[place] = self.chance.choice((*ODD, *self._texts, *self._numbers))
+                    value[place] = copy.deepcopy(self.chance.choice((*ODD, *self._texts, *self._numbers)))
             return
 
     def _body(self) -> AnyBody:
