@@ -200,7 +200,7 @@ class ReignDuty:
                 self._decide(answer.plan, done.duration_s)
                 self._go(answer)
                 self._dispatcher.permit(True)
-            elif not answer.failure and self._tree.may_propose(now_s, urgent=not self._serves(now_s)):
+            elif not answer.failure and self._tree.may_propose(now_s, urgent=self._stands or not self._serves(now_s)):
                 self._propose(answer, done.duration_s, now_s)
         self._heed(now_s)
 
@@ -213,6 +213,11 @@ class ReignDuty:
             self._complain("warning", "the motion is less than wished: ", course.reason)
         motion = self._dispatcher.motion
         return motion is not None and motion.plan == course.motion.plan
+
+    @property
+    def _stands(self) -> bool:
+        """Whether everybody holds, and waits for a plan whatever it is."""
+        return self._dispatcher.motion is None
 
     def _serves(self, now_s: float) -> bool:
         """Whether the tree in force still does for where the agent may be, with the robots that are there."""
