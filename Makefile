@@ -4,7 +4,7 @@ PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; 
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: demo test lint bench takeover fuzz docs lock clean
+.PHONY: demo test lint bench takeover chaos chaos-short fuzz docs lock clean
 
 demo: $(READY)
 	$(BIN)/sightline demo
@@ -27,6 +27,13 @@ bench: $(READY)
 # Real processes lose their leader, a robot, each other: about a quarter of an hour.
 takeover: $(READY)
 	$(BIN)/python -m tests.campaigns.takeover
+
+# Ten thousand missions in virtual time in which much goes wrong, and 200 with the full planner on the packaged maps.
+chaos: $(READY)
+	$(BIN)/python -m tests.campaigns.chaos --missions 10000 --real 200
+
+chaos-short: $(READY)
+	$(BIN)/python -m tests.campaigns.chaos --missions 300 --real 10
 
 # A million inputs of our own, then as many of atheris, which is no dependency: without it the second half is left out.
 fuzz: $(READY)

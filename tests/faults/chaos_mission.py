@@ -103,13 +103,14 @@ def draw_case(
 
     Args:
         seed: of everything.
-        robots: least and greatest number of them; base station and agent come on top.
-        duration_s: least and greatest, seconds.
+        robots: least and greatest number of them; base station and agent come on top. Large teams are rarer, since
+            what they cost rises with the square of their size.
+        duration_s: least and greatest, seconds; long missions are rarer.
         clocks: whether they may differ: where an estimate is shared they must not, but for a bound.
     """
     chance = Random(f"{seed}/case")
-    count = chance.randint(*robots)
-    ends_s = float(chance.randint(*duration_s))
+    count = robots[0] + int((robots[1] + 1 - robots[0]) * chance.random() ** 2)
+    ends_s = float(duration_s[0] + int((duration_s[1] + 1 - duration_s[0]) * chance.random() ** 2))
     voters = ("base", *robot_names(count))
     loses_disks = chance.random() < 0.15
     faults: list[Fault] = []

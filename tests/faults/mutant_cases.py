@@ -93,7 +93,7 @@ CASES: Final[dict[str, tuple[str, ChaosCase]]] = {
         "nobody moves who obeys nobody",
         _case(14.0, *(Kill(at_s=at_s, who=name) for at_s, name in ((7.5, "base"), (7.5, "robot2")))),
     ),
-    "begins_two_stages_ahead": ("nobody is two stages ahead", _case(26.0, robots=2)),
+    "begins_two_stages_ahead": ("nobody is two stages ahead", _case(14.0)),
     "goes_beyond_what_is_released": ("nobody goes beyond what is released", _case(12.0, robots=3)),
     "releases_before_all_have_accepted": (
         "nothing is released before all have accepted it",
