@@ -14,7 +14,9 @@ import pytest
 import agents.leader
 import maps
 from agents.leader import DeploymentPlanner, Plan
-from agents.whereabouts import announce
+from agents.roaming import Roaming
+from agents.target_set import TargetSet
+from agents.whereabouts import Whereabouts, announce
 from planning.decomposition import decompose
 from planning.deployment import NoChain
 from planning.environment import Environment
@@ -173,6 +175,77 @@ def test_a_decomposition_too_fine_to_plan_on_is_refused(office: Environment, mon
     monkeypatch.setattr(agents.leader, "MOST_TO_PLAN_ON", 10)
     with pytest.raises(TooManyCells, match="146 inflection cells, and at most 10"):
         DeploymentPlanner(office, BASE, RADIUS_M, "inflection", placements="cells")
+
+
+@pytest.fixture(scope="module")
+def roaming(office: Environment) -> Roaming:
+    return Roaming(GeodesicMap(office.inflated(RADIUS_M, containing=BASE)), 0.9, BASE)
+
+
+@pytest.fixture(scope="module")
+def points(office: Environment) -> DeploymentPlanner:
+    return DeploymentPlanner(office, BASE, RADIUS_M, "inflection", base_name="home", agent_name="visitor")
+
+
+def _surmise(office: Environment, roaming: Roaming, center: Point, radius_m: float) -> tuple[TargetSet, Whereabouts]:
+    """A disc, as far as it is free, of an agent that announces nothing."""
+    random = np.random.default_rng(0)
+    drawn = np.array([center, *(center + random.uniform(-radius_m, radius_m, (80, 2)))])
+    near = drawn[office.contains(drawn) & (np.hypot(*(drawn - center).T) <= radius_m)]
+    samples = tuple((float(x), float(y)) for x, y in near)
+    target = TargetSet(0.0, center, samples, (), math.pi * radius_m**2, 0.0)
+    return target, roaming.whereabouts(target, (0.0, 0.0), 0.0)
+
+
+def _sight_of_last(plan: Plan, office: Environment, places: Any) -> Any:
+    relays = [placement.position for placement in plan.placements if not placement.spare]
+    return office.line_of_sight(np.array([*[BASE], *relays][-1]), np.array(places))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_last_relay_sees_all_places_of_a_small_set(
+    points: DeploymentPlanner, office: Environment, roaming: Roaming, seed: int
+) -> None:
+    center, *starts = _places(office, 1 + points.most_relays_needed() + 2, 30 + seed)
+    target, agent = _surmise(office, roaming, center, 0.4)
+    robots = _team(starts)
+    plan = points.plan(agent, robots, None)
+    _check(plan, office, robots)
+    assert plan.serves
+    assert f"for the estimate of 0.50 m² around ({round(center[0], 2):.12g}, " in plan.reason
+    assert _sight_of_last(plan, office, agent.aims[0].places).all()
+    again = points.plan(agent, {place.robot: place.position for place in plan.placements}, plan)
+    assert again.edges == plan.edges
+    # No more relays than for any one place of the set are too few.
+    assert plan.relays_needed >= max(points.relays_needed(sample) for sample in target.samples[:10])
+
+
+def test_of_a_set_that_is_too_large_the_last_relay_sees_much(
+    points: DeploymentPlanner, office: Environment, roaming: Roaming
+) -> None:
+    _, agent = _surmise(office, roaming, (15.5, 18.5), 9.0)
+    robots = _team([BASE] * (points.most_relays_needed() + 1))
+    plan = points.plan(agent, robots, None)
+    _check(plan, office, robots)
+    assert plan.serves
+    assert "for the most of the estimate" in plan.reason
+    assert not any(points.graph.sees_all(agent.aims[0].places))
+    # What it says of it is true of one of the aims.
+    said = float(plan.reason.split(", ")[-1].partition("%")[0]) / 100.0
+    seen = [float(aim.shares @ _sight_of_last(plan, office, aim.places)) for aim in agent.aims]
+    assert min(abs(share - said) for share in seen) < 0.006
+    assert said > 0.25
+
+
+def test_an_agent_never_measured_is_looked_for(
+    points: DeploymentPlanner, office: Environment, roaming: Roaming
+) -> None:
+    robots = _team([BASE] * 4)
+    agent = roaming.whereabouts(None, (0.0, 0.0), 0.0)
+    plan = points.plan(agent, robots, None)
+    _check(plan, office, robots)
+    assert "an agent of which nothing is known yet" in plan.reason
+    assert np.sum(_sight_of_last(plan, office, agent.aims[0].places)) > 10
 
 
 @pytest.mark.parametrize("spares", [0, 2])

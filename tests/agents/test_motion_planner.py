@@ -16,6 +16,8 @@ from agents.motion_message import end_stage, to_schedule
 from agents.motion_planner import MotionPlanner, Option
 from agents.movement_authority import MovementAuthority, Onset
 from agents.planning_job import Question
+from agents.roaming import Roaming
+from agents.target_set import TargetSet
 from agents.team_planner import EXCHANGED, TeamPlanner
 from agents.whereabouts import announce
 from planning.certificate import certify
@@ -189,6 +191,28 @@ def test_how_long_the_agent_is_certain_to_be_seen(team_planner: TeamPlanner) -> 
         door = float(np.hypot(8.0 - 1.0, 4.0 - 3.5))
         assert answer.in_sight_s == pytest.approx(door / 0.5 - lead_s, abs=0.2)
         assert answer.in_sight_s == pytest.approx(left_s, abs=0.5)
+
+
+def test_of_an_agent_that_is_only_measured_no_sight_is_promised_but_how_long_it_lasts() -> None:
+    motions, mission = make_planner(HALL)
+    deployments = DeploymentPlanner(HALL, BASE, 0.2, "inflection", agent_speed_m_s=mission.agent_speed_m_s)
+    roaming = Roaming(motions.geodesics, mission.agent_speed_m_s, BASE)
+    planner = TeamPlanner(HALL, deployments, motions, mission.agent_speed_m_s, roaming)
+    onset = stand(BASE, robot1=(2.0, 1.0), robot2=(2.0, 2.0))
+    samples = ((1.0, 3.5), (1.5, 3.5), (1.5, 3.0), (1.0, 3.0))
+    near = TargetSet(0.0, samples[0], samples, (), 0.25, 0.0)
+    question = Question(way=(), onset=onset, lead_s=1.0, previous=None, heading={}, target=near)
+    door = float(np.hypot(8.0 - 1.5, 4.0 - 3.5))
+    assert planner.plan(question).in_sight_s == pytest.approx(door / 0.5 - 1.0, abs=0.2)
+    above = TargetSet(0.0, (10.0, 11.0), ((10.0, 11.0), (10.5, 11.0)), (), 0.25, 0.0)
+    answer = planner.plan(Question(way=(), onset=onset, lead_s=0.0, previous=None, heading={}, target=above))
+    assert answer.failure == ""
+    assert answer.course is not None
+    assert answer.course.motion.connection == "team"
+    assert "agent" not in {way.member for way in answer.course.motion.ways}
+    check_certified(answer.course.motion, HALL, None)
+    nothing = planner.plan(Question(way=(), onset=onset, lead_s=0.0, previous=None, heading={}))
+    assert nothing.in_sight_s == 0.0
 
 
 def test_goals_keep_apart_from_each_other_and_from_the_lost(team_planner: TeamPlanner) -> None:
