@@ -1,7 +1,7 @@
 """The auction: the search for the next tree, one edge away from the present one, by all who have a vote.
 
 The leader says what is auctioned (:mod:`agents.lot`), and everybody looks for the best chain in which a link of its own
-is another (:meth:`agents.proposals.Proposer.offers`), beside its control loop and all at the same time. The least of
+is another (:meth:`agents.bidding.Bidder.offers`), beside its control loop and all at the same time. The least of
 what is offered is what the leader would have found alone with the search ``"one-edge"`` (thesis §3.6, algorithm 7); it
 goes into the leader's plan in the place of that search.
 

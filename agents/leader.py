@@ -23,9 +23,10 @@ from typing import Final, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from agents.bidding import Bidder
 from agents.lot import Lot
 from agents.outlook import Outlook
-from agents.proposals import Proposal, Proposer, relays_in_words
+from agents.proposals import Proposal, relays_in_words
 from agents.pursuit import Pursuit
 from agents.spares import Waiting
 from agents.whereabouts import Whereabouts, name_place
@@ -127,7 +128,7 @@ class DeploymentPlanner:
             environment, self._geodesics, apart_m=self._waiting.apart_m, agent_speed_m_s=agent_speed_m_s,
             bound_m=range_bound_m,
         )  # fmt: skip
-        self._proposer = Proposer(
+        self._proposer = Bidder(
             self.graph, base, search, robot_speed_m_s=robot_speed_m_s, agent_speed_m_s=agent_speed_m_s,
             apart_m=self._waiting.apart_m,
         )  # fmt: skip
@@ -194,7 +195,7 @@ class DeploymentPlanner:
         return Lot(agent.center, agent.aims, inside, standing, tuple(obstacles))
 
     def bid(self, lot: Lot, bidder: str) -> tuple[Offer, ...]:
-        """What a member of the team offers in an auction (:meth:`agents.proposals.Proposer.offers`)."""
+        """What a member of the team offers in an auction (:meth:`agents.bidding.Bidder.offers`)."""
         return self._proposer.offers(lot, self._base_name, self._agent_name, bidder)
 
     def _unreachable(self, point: Point) -> str:

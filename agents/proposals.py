@@ -21,8 +21,8 @@ agent on the way may well cost less.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache, partial
 from itertools import combinations, groupby, pairwise
 from typing import Final, TypeAlias
@@ -30,15 +30,12 @@ from typing import Final, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.lot import Lot
 from agents.whereabouts import Aim, Whereabouts
 from planning.chain import cheapest_chain
 from planning.deployment import NO_CHAIN, identify_robots
-from planning.own_edges import exchange_own, own_edges
 from planning.placement_graph import PlacementGraph
 from planning.redeployment import Search, redeploy
-from protocol.messages import Offer, Placement, Point
-from protocol.topology import in_words
+from protocol.messages import Placement, Point
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -137,76 +134,14 @@ class Proposer:
             standing: relays of the chain that there is, from the base outward.
             obstacles: where nobody can stand.
         """
-        order = _order(np.array(agent.center), robots, standing)
-        tree = _tree(order, standing)
+        order = team_order(np.array(agent.center), robots, standing)
+        tree = team_tree(order, standing)
         drive = self._drives(order, robots, obstacles)
         found = [self._chain(aim, order, drive, self._search, tree) for aim in agent.aims]
         if self._search in ("one-edge", "fixed") and not any(found):
             # The team's tree is too far from one that serves.
             found = [self._chain(aim, order, drive, "chain", tree) for aim in agent.aims]
         return [proposal for proposal in found if proposal is not None]
-
-    def offers(self, lot: Lot, base: str, agent: str, bidder: str) -> tuple[Offer, ...]:
-        """What a bidder has to offer in an auction: for each aim the best chain in which a link of its own is another.
-
-        Own is the link towards the base station, and to the last relay, or the base station without one, that to the
-        agent too: so each link is somebody's, and the least that all offer is what ``"one-edge"`` finds.
-
-        Args:
-            lot: what is auctioned.
-            base: name of the base station.
-            agent: name of the agent.
-            bidder: name of who offers.
-        """
-        order = _order(np.array(lot.center), lot.robots, lot.standing)
-        names = [base, agent, *order]
-        tree = _tree(order, lot.standing)
-        edges = own_edges(tree, BASE)
-        own = [
-            edge
-            for node, edge in edges.items()
-            if names[node] == bidder or (node == AGENT and names[edge[0] + edge[1] - AGENT] == bidder)
-        ]
-        drive = self._drives(order, lot.robots, lot.obstacles)
-        offers = []
-        for number, aim in enumerate(lot.aims):
-            if self._direct(aim) is not None:
-                continue
-            found = self._serve(aim, order, drive, partial(self._find_near, tree=tree, own=own))
-            if found is None:
-                continue
-            proposal, whole, exchange = found
-            removed, added = (None if edge is None else (names[edge[0]], names[edge[1]]) for edge in exchange)
-            offers.append(
-                Offer(
-                    aim=number, whole=whole, total_cost_m=proposal.total_cost_m or 0.0, cost=proposal.cost,
-                    relays=proposal.relays, removed=removed, added=added,
-                )
-            )  # fmt: skip
-        return tuple(offers)
-
-    def award(self, aims: Sequence[Aim], bids: Mapping[str, Sequence[Offer]]) -> list[Proposal]:
-        """The best that was offered for each aim; those that need no relay are nobody's to offer.
-
-        Args:
-            aims: of the auction.
-            bids: by bidder.
-        """
-        won: list[Proposal] = []
-        for number, aim in enumerate(aims):
-            direct = self._direct(aim)
-            offers = [(offer, name) for name, those in bids.items() for offer in those if offer.aim == number]
-            if direct is not None:
-                won.append(direct)
-            elif offers:
-                offer, bidder = min(offers, key=lambda bid: (not bid[0].whole, bid[0].total_cost_m))
-                purpose = aim.whole if offer.whole else aim.part
-                how = "the tree as it is"
-                if offer.removed is not None and offer.added is not None:
-                    how = f"{in_words([offer.added])} for {in_words([offer.removed])}, bid by {bidder}"
-                reason = f"{relays_in_words(len(offer.relays))} {purpose}; {how}"
-                won.append(Proposal(offer.relays, True, reason, offer.cost, offer.total_cost_m))
-        return won
 
     def _drives(self, order: list[str], robots: Mapping[str, Point], obstacles: Sequence[Point]) -> Floats:
         """How far it is for each robot to each placement, (k, N) float, metres; inf where nobody can stand."""
@@ -282,15 +217,7 @@ class Proposer:
             return None if chain is None else Found(chain.robots, chain.cells, chain.lower_bound)
         costs, W = self._as_tree(move, to_agent)
         found = redeploy(costs, W, search=search, tree=tree, ends=(BASE, AGENT), idle=True)
-        return None if found.tree is None else _read(costs, found.tree, found.cells, float(found.lower_bound))
-
-    def _find_near(self, move: Floats, to_agent: Floats, tree: Ints, own: Collection[tuple[int, int]]) -> Found | None:
-        """The chain of the trees in which one of some edges is another."""
-        costs, W = self._as_tree(move, to_agent)
-        found = exchange_own(costs, W, tree, [BASE, AGENT], own)
-        if np.isinf(found.cost):
-            return None
-        return replace(_read(costs, found.tree, found.cells, 0.0), exchange=(found.removed, found.added))
+        return None if found.tree is None else read_chain(costs, found.tree, found.cells, float(found.lower_bound))
 
     def _as_tree(self, move: Floats, to_agent: Floats) -> tuple[Floats, Floats]:
         """Costs of all nodes and weights of all links, of a tree of base, agent and robots."""
@@ -365,7 +292,7 @@ class Proposer:
         return Placement(robot=robot, position=(x, y), cell=cell if cell >= 0 else None)
 
 
-def _read(costs: Floats, tree: Ints, cells: Ints, bound_m: float) -> Found:
+def read_chain(costs: Floats, tree: Ints, cells: Ints, bound_m: float) -> Found:
     """The chain between base and agent in a tree whose nodes have been placed."""
     # Where several would stand in one place, the one that drives least will do.
     kept = [
@@ -375,13 +302,13 @@ def _read(costs: Floats, tree: Ints, cells: Ints, bound_m: float) -> Found:
     return Found(tuple(node - FIRST_ROBOT for node, _ in kept), tuple(place for _, place in kept), bound_m)
 
 
-def _order(agent: Floats, robots: Mapping[str, Point], standing: Sequence[str]) -> list[str]:
+def team_order(agent: Floats, robots: Mapping[str, Point], standing: Sequence[str]) -> list[str]:
     """The relays of the standing chain from the base outward, then the others, nearest to the agent last."""
     others = [name for name in robots if name not in standing]
     return [*standing, *sorted(others, key=lambda name: -math.dist(robots[name], agent))]
 
 
-def _tree(order: Sequence[str], standing: Sequence[str]) -> Ints:
+def team_tree(order: Sequence[str], standing: Sequence[str]) -> Ints:
     """The team's tree: base, standing chain, agent, and the others at the agent; robots by their place in ``order``."""
     chain = [BASE, *range(FIRST_ROBOT, FIRST_ROBOT + len(standing)), AGENT]
     spares = range(FIRST_ROBOT + len(standing), FIRST_ROBOT + len(order))
