@@ -20,6 +20,7 @@ ALLOWED = {
 RECORDINGS = {
     "agents/recorder.py",
     "agents/recorder_columns.py",
+    "agents/recorder_estimate.py",
     "agents/recorder_file.py",
     "agents/recorder_layout.py",
     "agents/recorder_style.py",
