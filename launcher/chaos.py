@@ -30,7 +30,7 @@ def check_live(timetable: Timetable, mission: Mission) -> tuple[LiveFault, ...]:
     """The faults of a timetable, if live teams know them all.
 
     Raises:
-        ScenarioFault: there is one that only virtual time knows, or one that never comes.
+        ScenarioFault: there is one that only virtual time knows.
         FaultyTimetable: somebody is named who is not on the roster.
     """
     checked(timetable, [entry.name for entry in mission.roster])
@@ -48,11 +48,6 @@ def check_live(timetable: Timetable, mission: Mission) -> tuple[LiveFault, ...]:
             )
         if isinstance(fault, Kill) and fault.disk == "lost" and fault.for_s is None:
             raise ScenarioFault(f"faults[{place}] loses the disk of a peer that does not come back; add for_s = 5.0")
-        if mission.duration_s is not None and fault.at_s >= mission.duration_s:
-            raise ScenarioFault(
-                f"faults[{place}].at_s is {fault.at_s:g}, and the run is over at {mission.duration_s:g} s; "
-                "make it earlier, or the run longer"
-            )
         faults.append(fault)
     return tuple(faults)
 

@@ -28,7 +28,7 @@ from launcher import status as display
 from launcher.chaos import Chaos, LiveFault, check_live
 from launcher.chaos_control import KEYS, hearing_keys, listening, obey, order_of_key
 from launcher.console import busy, tell
-from launcher.fault_timetable import FaultyTimetable, Timetable, read_timetable
+from launcher.fault_timetable import FaultyTimetable, Timetable, describe, read_timetable
 from launcher.journal import OBSERVER, Journal
 from launcher.observer import Status, TeamView
 from launcher.preparation import Preparation, prepare
@@ -92,6 +92,10 @@ def run(
         mission, roster=roster, duration_s=duration_s or mission.duration_s, epoch_unix_s=time.time()
     )
     faults = _faults(file, preparation, mission, timetable)
+    for fault in faults:
+        if mission.duration_s is not None and fault.at_s >= mission.duration_s:
+            text = f"the run is over at {mission.duration_s:g} s, before {describe(fault)} at {fault.at_s:g} s"
+            tell(f"Warning: {text}", console, "yellow")
     folder = RunFolder.create(name, mission.team)
     folder.write(file, mission, preparation.environment)
     robots = f"{len(mission.robots)} robot" + "s" * (len(mission.robots) != 1)
@@ -139,10 +143,13 @@ def _listener(preparation: Preparation, mission: Mission) -> SharedEstimate | No
 def _faults(file: Path, preparation: Preparation, mission: Mission, timetable: Path | None) -> tuple[LiveFault, ...]:
     """The faults of the scenario and of a file, held against the mission."""
     names = [entry.name for entry in mission.roster]
+    faults: tuple[LiveFault, ...] = ()
+    place = file
     try:
-        place, faults = file, check_live(Timetable(faults=preparation.scenario.faults), mission)
+        faults = check_live(Timetable(faults=preparation.scenario.faults), mission)
         if timetable is not None:
-            place, faults = timetable, faults + check_live(read_timetable(timetable, names), mission)
+            place = timetable
+            faults += check_live(read_timetable(timetable, names), mission)
     except FaultyTimetable as problem:  # says its file
         raise ScenarioFault(str(problem)) from problem
     except ScenarioFault as problem:

@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import cast
 
 import pytest
+from typer.testing import CliRunner
 
 from agents.mission import Mission
 from agents.records import Mishap
 from launcher import chaos_control
 from launcher.chaos import Chaos, LiveFault, check_live
 from launcher.chaos_control import Answer, Order, give_order, listening, obey, order_of_key
+from launcher.cli import app
 from launcher.fault_timetable import (
     Cut,
     Delay,
@@ -163,7 +165,6 @@ def test_an_end_that_was_healed_away_does_not_end_a_later_fault(rig: Rig) -> Non
         (Delay(at_s=1.0, mean_s=0.1), "faults[0].kind is 'delay', which only `sightline simulate` knows; "),
         (Loss(at_s=1.0, share=0.5, burst=4.0), "faults[0].burst is 4, and live teams lose one publication at a time; "),
         (Kill(at_s=1.0, who="base", disk="lost"), "faults[0] loses the disk of a peer that does not come back; "),
-        (Kill(at_s=10.0, who="base"), "faults[0].at_s is 10, and the run is over at 10 s; "),
     ],
 )
 def test_what_a_live_team_cannot_do_is_one_sentence(mission: Mission, fault: Fault, sentence: str) -> None:
@@ -258,3 +259,53 @@ def test_an_order_reaches_the_launcher_of_a_folder_of_any_depth_and_nobody_when_
         give_order(RunFolder(deep), mission, Order(action="heal"))
     with pytest.raises(ScenarioFault, match="did you mean robot2"):
         give_order(RunFolder(deep), mission, Order(action="kill", who=("robot22",)))
+
+
+SCENARIO = """
+map = "square.json"
+[base]
+position = [1.0, 1.0]
+[agent]
+start = [3.0, 3.0]
+[robots]
+count = 2
+"""
+
+
+SQUARE = '{"name": "square", "units": "metres", "outer": [[0, 0], [5, 0], [5, 5], [0, 5]], "holes": []}'
+
+
+@pytest.mark.parametrize(
+    ("where", "fault", "sentence"),
+    [
+        ("scenario", 'kind = "kill"\nat_s = -1\nwho = "base"', "faults[0].at_s"),
+        (
+            "scenario",
+            'kind = "explode"\nat_s = 1\nwho = "base"',
+            "faults[0].kind is 'explode'; choose one of kill, pause",
+        ),
+        ("scenario", 'kind = "clock"\nat_s = 1\nwho = "base"', "faults[0].kind is 'clock', which only `sightline sim"),
+        ("timetable", 'kind = "kill"\nat_s = -1\nwho = "base"', "faults[0].at_s"),
+        (
+            "timetable",
+            'kind = "kill"\nat_s = 1\nwho = "robot7"',
+            "faults[0].who names 'robot7', who is not there; choose",
+        ),
+        ("timetable", 'kind = "pause"\nat_s = 1\nwho = "base"', "faults[0] pauses base for ever; add for_s"),
+    ],
+)
+def test_a_fault_that_does_not_fit_is_one_sentence_and_nothing_starts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, where: str, fault: str, sentence: str
+) -> None:
+    scenario, timetable = tmp_path / "scenario.toml", tmp_path / "timetable.toml"
+    entry = f"\n[[faults]]\n{fault}\n"
+    (tmp_path / "square.json").write_text(SQUARE)
+    scenario.write_text(SCENARIO + entry * (where == "scenario"))
+    timetable.write_text(entry * (where == "timetable"))
+    monkeypatch.chdir(tmp_path)
+    chaos = ["--chaos", str(timetable)] if where == "timetable" else []
+    answer = CliRunner().invoke(app, ["run", str(scenario), *chaos])
+    assert answer.exit_code == 2, answer.output
+    assert answer.stderr.startswith(f"sightline: {tmp_path / where}.toml: {sentence}")
+    assert answer.stderr.count("\n") == 1
+    assert not (tmp_path / "runs").exists()
