@@ -12,16 +12,16 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final, Literal, Protocol
+from typing import Final, Literal
 
 from agents.allegiance import AT_ONCE_S, Allegiance
 from agents.collection import Collection as Others
-from agents.link_sight import Scene, judge_links, places_on, stages_in_sight
+from agents.link_sight import Scene, judge_links, stages_in_sight
 from agents.mission import Mission
 from agents.records import LogLine, TopologyChange
 from agents.role import Compute, Effect, Event, Heard, JobDone, Publish, Record
 from agents.standing_orders import StandingOrders
-from agents.target_set import TargetSet
+from agents.surroundings import Body, Estimate, Surroundings
 from planning.environment import Environment
 from protocol import core
 from protocol.core import Note, Tick, WakeAt
@@ -30,16 +30,13 @@ from protocol.membership import Presence
 from protocol.messages import (
     Authority,
     Confirmation,
-    Deployment,
     Edge,
     LinkView,
     Method,
     Milestone,
     Motion,
-    NewLink,
     Point,
     Reign,
-    State,
     Topology,
     TreeNumber,
 )
@@ -53,21 +50,6 @@ FORESEEING: Final = "foreseeing links"
 
 ANSWER_S: Final = 1.0
 """The standing answer is said again after this."""
-
-
-class Body(Protocol):
-    """What is needed of a robot's own body."""
-
-    @property
-    def state(self) -> State | None:
-        """What it says of itself."""
-
-
-class Estimate(Protocol):
-    """What is needed of the shared estimate of the agent."""
-
-    def target(self, now_s: float) -> TargetSet | None:
-        """Where the agent may be; None: nothing has been measured yet."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,11 +91,9 @@ class TeamTree:
     ) -> None:
         self.held = HeldTree(allegiance.name)
         self._name = allegiance.name
-        self._agent = mission.tracked_agent.name
-        self._starts = {entry.name: entry.start for entry in mission.roster}
         self._voters = (mission.base_station.name, *(robot.name for robot in mission.robots))
-        self._environment, self._allegiance, self._orders, self._others = environment, allegiance, orders, others
-        self._body, self._estimate = body, estimate
+        self._allegiance = allegiance
+        self._surroundings = Surroundings(mission, environment, allegiance.name, orders, others, body, estimate)
         self._negotiation = Negotiation(self._voters)
         self._reign: Reign | None = None
         """That the negotiation is of."""
@@ -163,11 +143,11 @@ class TeamTree:
             places: base station and robots that are there, and where they are or go.
             now_s: the time.
         """
-        tree = self._negotiation.committed
-        if tree is None or self._agent not in tree.members or set(tree.members) - {self._agent} - places.keys():
+        tree, around = self._negotiation.committed, self._surroundings
+        if tree is None or around.agent not in tree.members or set(tree.members) - {around.agent} - places.keys():
             return False
-        links = [edge for edge in tree.edges if self._agent in edge]
-        scene = Scene(self._environment, None, places, self._agent, self._agent_places(now_s))
+        links = [edge for edge in tree.edges if around.agent in edge]
+        scene = Scene(around.environment, None, places, around.agent, around.may_be(now_s))
         return None not in stages_in_sight(scene, links)
 
     def propose(
@@ -183,7 +163,7 @@ class TeamTree:
             now_s: the time.
         """
         self._wish = _Wish(self._members(edges), tuple(edges), motion, method, reason)
-        scene = self._scene(motion, now_s)
+        scene = self._surroundings.scene(motion, now_s)
         return [Compute(FORESEEING, stages_in_sight, (scene, self._wish.edges))]
 
     def withdraw(self, reason: str, now_s: float) -> list[Effect]:
@@ -275,28 +255,11 @@ class TeamTree:
         links = self.held.to_judge()
         if self._judging is not None or not links or self._allegiance.obeyed(now_s) is None:
             return
-        orders = self._orders.in_force(now_s)
-        motion = None if orders is None else orders.motion
-        ready = tuple(link for link in links if self._is_accepted(link, orders))
-        scene = self._scene(motion, now_s)
-        if not scene.may_be:
-            ready = tuple(link for link in ready if self._agent not in link.ends)
+        scene, ready = self._surroundings.ready_to_judge(links, now_s)
         if ready:
             assert self.held.proposal is not None
             self._judging = self.held.proposal.tree.number
             self._effects.append(Compute(JUDGING, judge_links, (scene, self._name, ready)))
-
-    def _is_accepted(self, link: NewLink, orders: Deployment | None) -> bool:
-        """Whether this peer goes by the motion that a link is about."""
-        since, motion = link.since, None if orders is None else orders.motion
-        if since is None or orders is None or motion is None:
-            return since is None and orders is not None and motion is None
-        if (orders.authority.epoch, motion.plan, motion.revision) != (since.epoch, since.plan, since.revision):
-            return False
-        if self._body is None:
-            return True
-        own = None if self._body.state is None else self._body.state.progress
-        return own is not None and (own.epoch, own.plan, own.revision) == (since.epoch, since.plan, since.revision)
 
     def _judged(self, done: JobDone) -> None:
         number, self._judging = self._judging, None
@@ -358,23 +321,6 @@ class TeamTree:
         self._effects.append(Publish(answer))
         if self._allegiance.leads(now_s):
             self._negotiate(core.Heard(self._name, self._allegiance.incarnation, answer), now_s)
-
-    def _scene(self, motion: Motion | None, now_s: float) -> Scene:
-        states = {name: self._others.state(name) for name in self._voters}
-        if self._body is not None:
-            states[self._name] = self._body.state
-        base = self._voters[0]
-        places = {base: self._starts[base]}
-        places |= {name: state.position for name, state in states.items() if state is not None}
-        return Scene(self._environment, motion, places, self._agent, self._agent_places(now_s))
-
-    def _agent_places(self, now_s: float) -> Sequence[Point]:
-        """Where the agent may be, as far as this peer knows; empty: it does not."""
-        if self._estimate is not None:
-            target = self._estimate.target(now_s)
-            return () if target is None else target.samples
-        intent = self._others.intent()
-        return () if intent is None else places_on(intent.path or (intent.position,))
 
     def _log(self, level: Literal["info", "warning", "error"], text: str) -> None:
         self._effects.append(Record(LogLine(level=level, text=text)))
