@@ -199,7 +199,8 @@ class ReignDuty:
             if self._tree.is_in_force(answer.plan.edges):
                 self._decide(answer.plan, done.duration_s)
                 self._go(answer)
-                self._dispatcher.permit(True)
+                if not answer.failure:  # else what is under way may lead to a tree that was given up
+                    self._dispatcher.permit(True)
             elif not answer.failure and self._tree.may_propose(now_s, urgent=self._stands or not self._serves(now_s)):
                 self._propose(answer, done.duration_s, now_s)
         self._heed(now_s)
