@@ -21,7 +21,6 @@ step bounds the disc of the move by a polygon and may fuse neighbours; 1.08 in 9
 from __future__ import annotations
 
 import math
-import threading
 from copy import copy
 from dataclasses import dataclass, replace
 
@@ -95,39 +94,32 @@ class _Union:
     area: float
 
 
-class _Scratch(threading.local):
-    """Where the kernels write; each thread has its own."""
-
-    def __init__(self) -> None:
-        self.out = np.empty((MOST_PIECES, MOST_VERTICES, 2))
-        self.kept = np.empty(MOST_PIECES, dtype=np.int64)
-        self.passed = np.empty(MOST_PIECES)
-
-
-_scratch = _Scratch()
 _NO_ANNULI = np.empty((0, 4))
 
 
 class _Polygons:
     """Operations of the outlier rules on unions. Annuli come in the frame of the tight set."""
 
+    def __init__(self) -> None:
+        self._out = np.empty((MOST_PIECES, MOST_VERTICES, 2))
+        self._kept = np.empty(MOST_PIECES, dtype=np.int64)
+        self._passed = np.empty(MOST_PIECES)
+
     def _take(self, m: int, annuli: Floats, share: float = MERGE_SHARE) -> _Union:
         """The first m pieces of the output, merged where that costs little."""
-        out, kept, passed = _scratch.out, _scratch.kept, _scratch.passed
+        out, kept, passed = self._out, self._kept, self._passed
         m = convex_pieces.merge(out, kept, passed, m, share, 3 * MOST_PIECES // 4)
         pieces, counts = out[:m].copy(), kept[:m].copy()
         return _Union(pieces, counts, passed[:m].copy(), annuli, convex_pieces.total_area(pieces, counts))
 
     def begin(self, annulus: Annulus) -> _Union:
-        return self._take(
-            convex_pieces.ring(*annulus, _scratch.out, _scratch.kept, _scratch.passed), np.array([annulus])
-        )
+        return self._take(convex_pieces.ring(*annulus, self._out, self._kept, self._passed), np.array([annulus]))
 
     def cut(self, held: _Union, annulus: Annulus) -> _Union | None:
         annuli = np.empty((len(held.annuli) + 1, 4))
         annuli[:-1], annuli[-1] = held.annuli, annulus
         m, changed, telling = convex_pieces.cut(
-            held.pieces, held.counts, held.checked, annuli, _scratch.out, _scratch.kept, _scratch.passed
+            held.pieces, held.counts, held.checked, annuli, self._out, self._kept, self._passed
         )
         if m == 0:
             return None
@@ -161,7 +153,7 @@ class _Polygons:
         return _Union(pieces, counts, checked, _NO_ANNULI, area)
 
     def grow(self, held: _Union, distance_m: float) -> _Union:
-        m = convex_growth.grow(held.pieces, held.counts, distance_m, _scratch.out, _scratch.kept, _scratch.passed)
+        m = convex_growth.grow(held.pieces, held.counts, distance_m, self._out, self._kept, self._passed)
         annuli = held.annuli.copy()
         # An inner radius below 0 bounds nothing, as it should.
         annuli[:, 2:] += -distance_m, distance_m
@@ -184,7 +176,8 @@ class TightSet:
 
     def __deepcopy__(self, memo: object) -> TightSet:
         twin = copy(self)
-        twin._rule = copy(self._rule)  # what rules hold is replaced, never changed
+        # What a rule holds is replaced, never changed. Copies share the places that kernels write to, and so a thread.
+        twin._rule = copy(self._rule)
         return twin
 
     @property
