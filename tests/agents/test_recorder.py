@@ -260,9 +260,11 @@ def test_a_motion_is_drawn_with_its_stages_and_how_far_everybody_is(tmp_path: Pa
     motion = Motion(
         plan=0, revision=3, first_stage=5, released=-1, ways=ways, connection="joined", joined=("base", "robot_1")
     )
-    recorder.record(1.0, "base", Ordered(motion=motion))
+    recorder.record(1.0, "base", Ordered(epoch=0, motion=motion))
     recorder.record(1.1, "base", Advance(released=6, finished={"robot_1": 5, "robot_2": 6}))
-    recorder.record(2.0, "base", Ordered(motion=structs.replace(motion, connection="team", ways=(*ways, agent))))
+    recorder.record(
+        2.0, "base", Ordered(epoch=0, motion=structs.replace(motion, connection="team", ways=(*ways, agent)))
+    )
     recorder.record(2.1, "base", Planned(planning_s=0.01, in_sight_s=4.5))
     recorder.close()
     file = tmp_path / "motion.rrd"

@@ -24,7 +24,6 @@ EXPLORED = {
     "two stand": TWO_STAND,
     "any two of three stand, a slow leader": Bounds(steps=2, candidacies=2, rates=(SLOW, FAST, FAST)),
     "a candidate hears of other epochs": replace(TWO_STAND, steps=3, refusals=True),
-    "one dies without its disk": replace(ONE_DIES, lose_disks=True),
     "two die": replace(ONE_DIES, crashes=2),
     "two die within half a lease, with disk or without": replace(ONE_DIES, crashes=2, lose_disks=True, steps=1),
     "one obeys": ONE_OBEYS,
