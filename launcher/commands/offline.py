@@ -81,6 +81,7 @@ def _simulate(file: Path, seeds: int, duration_s: float | None, record: Path | N
     from msgspec import to_builtins
     from rich.progress import Progress
 
+    from launcher.fault_timetable import Timetable
     from launcher.preparation import prepare
     from launcher.report import measure
     from launcher.report_table import render
@@ -92,6 +93,7 @@ def _simulate(file: Path, seeds: int, duration_s: float | None, record: Path | N
     for warning in preparation.warnings:
         tell(f"Warning: {warning}", err, "yellow")
     mission, environment = preparation.mission, preparation.environment
+    faults = Timetable(faults=preparation.scenario.faults)
     length_s = duration_s or mission.duration_s or UNTIL_TOLD_S
     results: list[tuple[int, Metrics]] = []
     begun_s = time.perf_counter()
@@ -100,8 +102,9 @@ def _simulate(file: Path, seeds: int, duration_s: float | None, record: Path | N
             recorder = _open_recorder(preparation, record) if record is not None and not results else None
             try:
                 trace = simulate_mission(
-                    mission, environment, recorder=recorder, duration_s=length_s, seed=seed, planner=preparation.planner
-                )
+                    mission, environment, recorder=recorder, duration_s=length_s, seed=seed,
+                    planner=preparation.planner, faults=faults,
+                )  # fmt: skip
             finally:
                 if recorder is not None:
                     recorder.close()
