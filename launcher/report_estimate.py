@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 import msgspec
 import numpy as np
@@ -14,6 +15,9 @@ from launcher.mission_trace import MissionTrace, Trail
 from protocol.messages import Point
 
 Floats = NDArray[np.float64]
+
+AT_THE_END_S: Final = 1.5
+"""Who has recorded nothing for so long is not there any more, and need not have what was measured since."""
 
 
 class EstimateFigures(msgspec.Struct, frozen=True, kw_only=True):
@@ -56,9 +60,10 @@ def measure_estimates(trace: MissionTrace) -> EstimateFigures | None:
     errors_m = [float(np.hypot(*np.subtract(estimate.center, truth))) for estimate, truth in judged]
     error_m, worst_error_m = np.percentile(errors_m, (50, 95)).tolist()
     area_m2, worst_area_m2 = np.percentile([estimate.area_m2 for estimate, _ in judged], (50, 95)).tolist()
-    last = {peer: estimate for _, peer, estimate in trace.estimates}
+    last = {peer: (time_s, estimate) for time_s, peer, estimate in trace.estimates}
+    ends_s = max(time_s for time_s, _ in last.values())
     made = _made(trace.estimates)
-    lacking = [max(made - estimate.heard, 0) / made for estimate in last.values()] if made else [0.0]
+    lacking = [max(made - estimate.heard, 0) for time_s, estimate in last.values() if time_s > ends_s - AT_THE_END_S]
     return EstimateFigures(
         records=len(judged),
         error_median_m=error_m,
@@ -69,9 +74,9 @@ def measure_estimates(trace: MissionTrace) -> EstimateFigures | None:
         contained=float(np.mean([_holds(estimate.rings, truth, tolerance_m) for estimate, truth in judged])),
         equal=_equal(trace.estimates),
         ranges=made,
-        unshared=float(np.mean(lacking)),
-        late=sum(estimate.late for estimate in last.values()),
-        refused=sum(estimate.refused for estimate in last.values()),
+        unshared=float(np.mean(lacking)) / max(made, 1),
+        late=sum(estimate.late for _, estimate in last.values()),
+        refused=sum(estimate.refused for _, estimate in last.values()),
     )
 
 

@@ -46,10 +46,10 @@ HARDSHIPS = {
     WORST: (
         *BAD_LINKS,
         *CLOCKS,
-        Kill(at_s=5.0, for_s=2.0, who="robot2"),
-        Kill(at_s=6.0, for_s=1.0, who="agent"),
-        Pause(at_s=8.0, for_s=1.5, who="robot3"),
-        Partition(at_s=10.0, for_s=3.0, group=("base", "robot1")),
+        Kill(at_s=2.0, for_s=1.5, who="robot2"),
+        Kill(at_s=3.0, for_s=0.5, who="agent"),
+        Pause(at_s=4.0, for_s=1.5, who="robot3"),
+        Partition(at_s=6.0, for_s=2.5, group=("base", "robot1")),
     ),
 }
 
@@ -69,21 +69,21 @@ def sets(team: EstimateTeam) -> dict[str, object]:
     return {name: team.estimate(name).ranges.state_at(team.now_s).tight.snapshot() for name in VOTERS}
 
 
-@pytest.mark.parametrize(("hardship", "seed"), [*((hardship, 1) for hardship in HARDSHIPS), (WORST, 2), (WORST, 3)])
+@pytest.mark.parametrize(("hardship", "seed"), [*((hardship, 1) for hardship in HARDSHIPS), (WORST, 2)])
 def test_the_agent_is_inside_every_set_and_all_end_with_the_same(hardship: str, seed: int) -> None:
     team = EstimateTeam(seed, *HARDSHIPS[hardship], clock_bound_s=0.15)
-    team.run_until(15.0)
+    team.run_until(9.0)
     assert not team.escapes, f"seed {seed}: {team.escapes[:3]}"
-    assert team.checks > 100
+    assert team.checks > 50
     # The faults go on; only ranging ends.
     team.silence_the_agent()
-    team.run_until(23.0)
+    team.run_until(16.0)
     known = sets(team)
     assert all(held == known["base"] for held in known.values()), f"seed {seed}"
     logs = [team.estimate(name).ranges for name in VOTERS]
     assert len({frozenset(log.log.heard.items()) for log in logs}) == 1, f"seed {seed}"
     assert not any(log.late for log in logs), f"seed {seed}"
-    fingerprints = {log.fingerprint(18.0) for log in logs}
+    fingerprints = {log.fingerprint(12.0) for log in logs}
     assert len(fingerprints) == 1 and fingerprints != {None}
 
 
