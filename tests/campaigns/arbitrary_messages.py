@@ -15,10 +15,27 @@ from typing import Any, Final
 
 import msgspec
 from msgspec import inspect as types
+from msgspec import structs
 
 from protocol.bus import BusEvent, PeerAppeared, PeerVanished, Received
 from protocol.keys import Address
-from protocol.messages import BODIES, MAXIMUM_PAYLOAD_BYTES, AnyBody, Envelope, encode, kind_of
+from protocol.messages import (
+    BODIES,
+    MAXIMUM_PAYLOAD_BYTES,
+    AnyBody,
+    Auction,
+    Authority,
+    Deployment,
+    Envelope,
+    LastHeard,
+    Reign,
+    Topology,
+    Vote,
+    VoteRequest,
+    Warrant,
+    encode,
+    kind_of,
+)
 from protocol.schemas import EXAMPLES
 
 ODD: Final[tuple[Any, ...]] = (
@@ -56,15 +73,30 @@ class Mischief:
         self._team = team
         self._names = tuple(names)
         self._speakers = tuple(name for name in names if name != hearer)
-        self._kinds = tuple(sorted(kinds))
+        self._elects = self.chance.random() < 0.5
+        """Whether it would have the hearer lead, and says nothing that keeps it from that; else somebody else."""
+        self._kinds = tuple(sorted({*kinds} - {"vote_request"} if self._elects and len(kinds) > 3 else kinds))
+        self._examples = tuple(body for body in EXAMPLES if kind_of(body) in self._kinds)
         self._incarnations = dict.fromkeys((*names, OPERATOR), 0)
         self._sequence = 0
+        self._hearer = hearer
+        self._request: VoteRequest | None = None
+        """The last one of the hearer."""
+        self._mark = "x"
+        """The last one of the hearer's votes."""
+        self._reign = Reign(epoch=1, leader=self._speakers[-1], incarnation=0)
+        """Of somebody who seems to lead."""
         self._said: deque[Received] = deque(maxlen=200)
         self._texts: deque[str] = deque(["x"], maxlen=40)
         self._numbers: deque[int] = deque([0, 1], maxlen=40)
 
     def overhear(self, envelope: Envelope) -> None:
-        """Remember what a peer has said."""
+        """Remember what the hearer has said."""
+        match envelope.body:
+            case VoteRequest(withdrawn=False) as request:
+                self._request = request
+            case Vote(mark=mark):
+                self._mark = mark
         self._gather(msgspec.to_builtins(envelope.body))
 
     def event(self) -> BusEvent:
@@ -76,6 +108,8 @@ class Mischief:
             return Received(self._key(), self.chance.randbytes(int(self.chance.expovariate(0.02))))
         if draw < 0.15 and self._said:
             return self.chance.choice(self._said)  # once more, and late
+        if draw < 0.20:
+            return self._remember(self._help())
         if draw < 0.40:
             return self._remember(self._sane(self._body()))
         if draw < 0.60:
@@ -91,12 +125,40 @@ class Mischief:
         self._said.append(event)
         return event
 
-    def _sane(self, body: AnyBody) -> Received:
+    def _help(self) -> Received:
+        """A vote for the hearer, a word of who seems to lead, or an order of it: in force, and without sense."""
+        request, chance = self._request, self.chance
+        if request is not None and self._elects:
+            promise = Reign(epoch=request.epoch, leader=self._hearer, incarnation=0)
+            vote = Vote(
+                candidate=self._hearer,
+                correlation=request.correlation,
+                granted=True,
+                promise=None if request.canvass else promise,
+                mark=f"{self._sequence}",
+            )
+            return self._sane(vote)
+        if chance.random() < 0.02:
+            epoch = self._reign.epoch + chance.randrange(1, 3)
+            self._reign = Reign(epoch=epoch, leader=chance.choice(self._speakers), incarnation=0)
+        leader = self._reign.leader
+        warrant = Warrant(lease_s=0.8, marks=(LastHeard(peer=self._hearer, mark=self._mark),))
+        body = self._body()
+        if self._elects:
+            return self._sane(body)
+        if isinstance(body, Deployment | Topology | Auction):
+            authority = Authority(epoch=self._reign.epoch, leader=leader, sequence=self._sequence)
+            return self._sane(structs.replace(body, authority=authority, warrant=warrant), leader)
+        return self._sane(
+            VoteRequest(epoch=self._reign.epoch, correlation=f"{self._sequence}", warrant=warrant), leader
+        )
+
+    def _sane(self, body: AnyBody, speaker: str = "") -> Received:
         """A message as a peer would send it, whose process is mostly the one that spoke last."""
         self._sequence += 1
         operator = kind_of(body) == "goal"
-        name = OPERATOR if operator else self.chance.choice(self._speakers)
-        self._incarnations[name] += self.chance.random() < 0.005
+        name = speaker or (OPERATOR if operator else self.chance.choice(self._speakers))
+        self._incarnations[name] += not speaker and self.chance.random() < 0.0005
         envelope = Envelope(
             sender=name,
             incarnation=max(0, self._incarnations[name] - (self.chance.random() < 0.02)),
@@ -166,7 +228,7 @@ class Mischief:
         return body
 
     def _example(self) -> AnyBody:
-        return self.chance.choice(EXAMPLES)
+        return self.chance.choice(self._examples)
 
     def _value(self, kind: Any) -> Any:
         chance = self.chance

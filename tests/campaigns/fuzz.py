@@ -21,7 +21,7 @@ from typing import Final, Literal
 
 from agents.casting import Casting
 from agents.mission import Mission, OnDemand, RosterEntry
-from agents.records import AnyRecord, LogLine
+from agents.records import AnyRecord, LogLine, Office
 from agents.role import Compute, JobDone, Persist, Written
 from agents.shell import MAXIMUM_OPERATORS, PeerShell
 from planning.environment import Environment
@@ -87,6 +87,8 @@ class Life:
         self.name = name
         self.now_s = 0.0
         self.lines = self.published = self.given = 0
+        self.led = False
+        """Whether it was ever elected."""
         self._jobs: list[Compute] = []
         self._promises: list[Persist] = []
         role, driver = casting.cast(name)
@@ -144,6 +146,7 @@ class Life:
 
     def _record(self, _: float, record: AnyRecord) -> None:
         self.lines += isinstance(record, LogLine)
+        self.led |= isinstance(record, Office) and record.leads is not None
 
 
 def make_casting() -> Casting:
@@ -153,29 +156,33 @@ def make_casting() -> Casting:
     return casting
 
 
-def fuzz(inputs: int, first_seed: int, casting: Casting, names: Iterable[str] = NAMES[:3]) -> list[str]:
-    """Give so many inputs to one peer after the other; what went wrong."""
+def fuzz(
+    inputs: int, first_seed: int, casting: Casting, names: Iterable[str] = NAMES[:3], life: int = LIFE
+) -> list[str]:
+    """Give so many inputs to one peer after the other, ``life`` to each; what went wrong."""
     complaints: list[str] = []
     refused: Counter[str] = Counter()
-    given, seed, shown = 0, first_seed, time.monotonic()
+    given, led, seed, shown = 0, 0, first_seed, time.monotonic()
     order = tuple(names)
     while given < inputs:
         name = order[seed % len(order)]
-        life = Life(casting, name, seed)
-        for _ in range(min(LIFE, inputs - given)):
-            life.give(life.mischief.event())
-            if life.shell.traceback:
+        peer = Life(casting, name, seed)
+        for _ in range(min(life, inputs - given)):
+            peer.give(peer.mischief.event())
+            if peer.shell.traceback:
                 break
-        given += life.given
-        if complaint := life.complaint():
-            complaints.append(f"seed {seed}, {name}, input {life.given}: {complaint}")
-        refused += life.shell.refused
+        given += peer.given
+        led += peer.led
+        if complaint := peer.complaint():
+            complaints.append(f"seed {seed}, {name}, input {peer.given}: {complaint}")
+        refused += peer.shell.refused
         seed += 1
         if time.monotonic() - shown > 5.0:
             shown = time.monotonic()
             print(f"{given:,} of {inputs:,} inputs, {resident_mb():.0f} MB", file=sys.stderr, flush=True)
     reasons = ", ".join(f"{count:,} {reason}" for reason, count in refused.most_common())
-    print(f"{given:,} inputs to {seed - first_seed} peers in turn; refused: {reasons}; {len(complaints)} complaints")
+    peers = f"{seed - first_seed} peers in turn, of which {led} were made to lead"
+    print(f"{given:,} inputs to {peers}; refused: {reasons}; {len(complaints)} complaints")
     return complaints
 
 
