@@ -74,6 +74,7 @@ class Roaming:
         self._geodesics, self._speed_m_s, self._home = geodesics, speed_m_s, home
         self._nodes = _spread(geodesics)
         self._table = GeodesicTable(geodesics, self._nodes)
+        self._between = self._table.between
 
     def whereabouts(self, target: TargetSet | None, drift_m_s: Point, lead_s: float) -> Whereabouts:
         """Where the agent may be in a moment.
@@ -102,18 +103,23 @@ class Roaming:
         stays = STAYS if going else 1.0
         ways = (*going, *staying)
         likely = np.concatenate([(1.0 - stays) * chances, np.full(len(staying), stays / len(staying))])
-        now = np.concatenate([samples, *(way[:1] for way in going)])
         title = f"the estimate of {in_words(target.area_m2)} around {name_place(target.center)}"
+        now = np.concatenate([samples, *(way[:1] for way in going)])
+        likeliest = [going[index] for index in np.argsort(-chances, kind="stable")[:AIMED]]
+        aims = self._aims(title, now, lengths - gone_m, likeliest)
+        return Whereabouts((x, y), ways, likely, aims, announced=False)
+
+    def _aims(self, title: str, now: Floats, lengths: Floats, likeliest: list[Floats]) -> tuple[Aim, ...]:
+        """For the set, the set grown, the set and each of the likeliest ways; nodes are so far away (n,), metres."""
         aims = [_aim(now, np.empty((0, 2)), 0.0, title, f"for {title}")]
         for growth_m in GROWTHS_M:
-            grown = self._nodes[(lengths > 0.0) & (lengths <= growth_m + gone_m)]
-            if len(grown):
+            if np.any(lengths <= growth_m):
+                grown = self._nodes[lengths <= growth_m]
                 aims.append(_aim(now, grown, growth_m, title, f"for {title} and all within {growth_m:.1f} m of it"))
-        for index in np.argsort(-chances, kind="stable")[:AIMED]:
-            way = going[index]
+        for way in likeliest:
             pieces = walk(way, np.arange(0.0, length(way) + PIECE_M, PIECE_M))
             aims.append(_aim(now, pieces, length(way), title, f"for {title} and the way to {name_place(way[-1])}"))
-        return Whereabouts((x, y), ways, likely, tuple(aims), announced=False)
+        return tuple(aims)
 
     def _anywhere(self) -> Whereabouts:
         """Of an agent of which nothing has been measured."""
@@ -136,7 +142,7 @@ class Roaming:
         gaps = lengths[nodes].copy()
         while len(chosen) < WAYS and len(nodes) and gaps.max() > NEAR_M:
             chosen.append(int(nodes[gaps.argmax()]))
-            gaps = np.minimum(gaps, self._table.between[chosen[-1], nodes])
+            gaps = np.minimum(gaps, self._between[chosen[-1], nodes])
         return chosen
 
     def _chances(self, ways: list[Floats], drift_m_s: Floats) -> Floats:
