@@ -127,17 +127,18 @@ class MotionRules:
             raise Violation("nobody moves who obeys nobody", f"{peer.name} is to drive {late_s:.3f} s longer")
 
     def _judge_release(self, epoch: int, motion: Motion) -> None:
-        """Whether all robots have accepted a revision of which something is released."""
+        """Whether all robots have accepted what is released: in this revision, or the same in the one they follow."""
         for way in motion.ways:
             peer = self._peers.get(way.member)
-            if way.scheduled and peer is not None and peer.part(Robot) is not None:
-                _, last = self._progress.get(way.member, (-1, None))
-                accepted = last is not None and (last.epoch, last.plan) == (epoch, motion.plan)
-                if last is None or not accepted or last.revision < motion.revision:
-                    text = (
-                        f"stage {motion.released} of revision {motion.revision}, and {way.member} has not accepted it"
-                    )
-                    raise Violation("nothing is released before all have accepted it", text)
+            if not way.scheduled or peer is None or peer.part(Robot) is None:
+                continue
+            _, last = self._progress.get(way.member, (-1, None))
+            accepted = None
+            if last is not None and (last.epoch, last.plan) == (epoch, motion.plan):
+                accepted = self._motions.get((epoch, last.plan, last.revision))
+            if accepted is None or not _agree(accepted, motion):
+                text = f"stage {motion.released} of revision {motion.revision}, and {way.member} has not accepted it"
+                raise Violation("nothing is released before all have accepted it", text)
 
     def _judge(self, peer: SimulatedPeer, incarnation: int, progress: Progress, *, moves: bool) -> None:
         name = peer.name
@@ -196,6 +197,21 @@ class MotionRules:
         if known is None or (known[1].epoch, known[1].plan) != (progress.epoch, progress.plan):
             return 0
         return known[1].finished
+
+
+def _agree(one: Motion, other: Motion) -> bool:
+    """Whether two revisions have the same stages, as far as the second is released and the first reaches back."""
+    if one.revision == other.revision:
+        return True
+    if end_stage(one) <= other.released:
+        return False
+    ways = {way.member: way for way in one.ways}
+    return all(
+        piece(ways[way.member], stage - one.first_stage) == piece(way, stage - other.first_stage)
+        for way in other.ways
+        if way.scheduled
+        for stage in range(max(one.first_stage, other.first_stage), other.released + 1)
+    )
 
 
 def _order(authority: Authority) -> tuple[int, int]:
