@@ -76,7 +76,7 @@ def fault(
     ] = None,
 ) -> None:
     """Have something go wrong in a running team: kill or pause a peer's process, cut its links, or heal them."""
-    from launcher.chaos_control import Order, give_order
+    from launcher.fault_order import Order, give_order
     from launcher.run_folder import RunFolder
 
     with plainly():

@@ -14,8 +14,9 @@ from agents.mission import Mission
 from agents.records import Mishap
 from launcher import chaos_control
 from launcher.chaos import Chaos, LiveFault, check_live
-from launcher.chaos_control import Answer, Order, give_order, listening, obey, order_of_key
+from launcher.chaos_control import listening, obey, order_of_key
 from launcher.cli import app
+from launcher.fault_order import Answer, Order, give_order, shortened
 from launcher.fault_timetable import (
     Cut,
     Delay,
@@ -243,7 +244,7 @@ def test_an_order_reaches_the_launcher_of_a_folder_of_any_depth_and_nobody_when_
     async def play() -> tuple[str, str]:
         async with listening(deep, answer):
             done = await asyncio.to_thread(give_order, RunFolder(deep), mission, Order(action="heal"))
-            with chaos_control._short(deep) as short:
+            with shortened(deep) as short:
                 _, writer = await asyncio.open_unix_connection(short / "control")
             writer.write(b"nonsense" * 10_000)  # more than anybody reads
             writer.close()
