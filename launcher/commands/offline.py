@@ -29,6 +29,10 @@ def simulate(
         float | None, typer.Option("--duration", help="Seconds, 1 to 86400, instead of the scenario's duration.")
     ] = None,
     record: Annotated[Path | None, typer.Option(help="Write the recording of the first mission (.rrd).")] = None,
+    faults: Annotated[
+        Path | None, typer.Option(help="TOML file of faults that happen on a timetable, besides the scenario's own.")
+    ] = None,
+    loss: Annotated[float | None, typer.Option(help="Share of messages that each peer misses, 0 to 1.")] = None,
     as_json: AsJson = False,
 ) -> None:
     """Run the very same roles in virtual time; print what it was worth."""
@@ -36,9 +40,10 @@ def simulate(
         file = find_scenario(scenario)
         check_option("--seeds", seeds, 1, MOST_SEEDS)
         check_option("--duration", duration_s, 1, LONGEST_S, "seconds")
+        check_option("--loss", loss, 0, 1)
         if record is not None:
             _check_recording(record)
-        _simulate(file, seeds, duration_s, record, as_json)
+        _simulate(file, seeds, duration_s, record, faults, loss or 0.0, as_json)
 
 
 def review(
@@ -77,11 +82,19 @@ def _check_recording(record: Path) -> None:
         raise ScenarioFault(f"--record {record}: there is no folder {record.parent}; make it, or choose another")
 
 
-def _simulate(file: Path, seeds: int, duration_s: float | None, record: Path | None, as_json: bool) -> None:
+def _simulate(
+    file: Path,
+    seeds: int,
+    duration_s: float | None,
+    record: Path | None,
+    timetable: Path | None,
+    loss: float,
+    as_json: bool,
+) -> None:
     from msgspec import to_builtins
     from rich.progress import Progress
 
-    from launcher.fault_timetable import Timetable
+    from launcher.fault_timetable import Timetable, read_timetable
     from launcher.preparation import prepare
     from launcher.report import measure
     from launcher.report_table import render
@@ -93,7 +106,9 @@ def _simulate(file: Path, seeds: int, duration_s: float | None, record: Path | N
     for warning in preparation.warnings:
         tell(f"Warning: {warning}", err, "yellow")
     mission, environment = preparation.mission, preparation.environment
-    faults = Timetable(faults=preparation.scenario.faults)
+    faults = preparation.scenario.faults
+    if timetable is not None:
+        faults += read_timetable(timetable, [entry.name for entry in mission.roster]).faults
     length_s = duration_s or mission.duration_s or UNTIL_TOLD_S
     results: list[tuple[int, Metrics]] = []
     begun_s = time.perf_counter()
@@ -103,7 +118,7 @@ def _simulate(file: Path, seeds: int, duration_s: float | None, record: Path | N
             try:
                 trace = simulate_mission(
                     mission, environment, recorder=recorder, duration_s=length_s, seed=seed,
-                    planner=preparation.planner, faults=faults,
+                    planner=preparation.planner, faults=Timetable(faults=faults), loss=loss,
                 )  # fmt: skip
             finally:
                 if recorder is not None:
