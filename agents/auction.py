@@ -6,19 +6,20 @@ what is offered is what the leader would have found alone with the search ``"one
 goes into the leader's plan in the place of that search.
 
 An auction is bounded: it closes when all have bid, and at the latest after :data:`OPEN_S`. What has not been heard by
-then is not missed for long, as there is a next one. Question and bids are repeated, so that loss costs only time.
+then is not missed for long, as there is a next one. Question and bids are repeated, so that loss costs only time. The
+team goes on meanwhile: what is planned after it begins where the robots are by then.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Final, Protocol
 
-from agents.allegiance import Allegiance
-from agents.lot import Lot, from_auction, to_auction
-from agents.planning_job import Answer, Question
+from agents.allegiance import AT_ONCE_S, Allegiance
+from agents.lot import Bids, Lot, from_auction, to_auction
+from agents.planning_job import Question
 from agents.records import LogLine
 from agents.role import Compute, Effect, Event, Heard, JobDone, Publish, Record
 from protocol.messages import Auction, Authority, Bid, Offer
@@ -43,17 +44,11 @@ class Planner(Protocol):
     def bid(self, lot: Lot, bidder: str) -> tuple[Offer, ...]:
         """What a member of the team offers."""
 
-    def plan(self, question: Question) -> Answer:
-        """The answer to a question."""
-
 
 @dataclass(slots=True)
 class _Held:
     """An auction of this peer's own."""
 
-    question: Question
-    job: str
-    """That is to answer the question."""
     number: int = -1
     lot: Lot | None = None
     """None until it is described."""
@@ -79,6 +74,10 @@ class Auctioneer:
         self._name = allegiance.name
         self._numbers = self._said = 0
         self._held: _Held | None = None
+        self._bids: Bids | None = None
+        """Of an auction that has closed."""
+        self._closed = False
+        """Whether it has since this peer was woken."""
         self._wanted: tuple[int, int, Lot] | None = None
         """Epoch and number of the last auction heard, until a job looks for an offer."""
         self._bidding: tuple[int, int] | None = None
@@ -90,21 +89,36 @@ class Auctioneer:
 
     @property
     def next_s(self) -> float:
-        """When an auction of its own is to be said again, or closes."""
+        """When an auction of its own is to be said again, or closes; at once when one has closed."""
+        if self._closed:
+            return AT_ONCE_S
         return math.inf if self._held is None else min(self._held.again_s, self._held.closes_s)
 
-    def hold(self, question: Question, job: str) -> list[Effect]:
-        """Have a question answered with the help of all: by a job of this name, when the auction has closed."""
-        self._held = _Held(question, job)
+    @property
+    def busy(self) -> bool:
+        """Whether an auction is open, or its bids are waiting."""
+        return self._held is not None or self._bids is not None
+
+    def hold(self, question: Question) -> list[Effect]:
+        """Hold an auction before a question is answered, unless :attr:`busy`."""
+        self._held = _Held()
         return [Compute(DESCRIBING, self._planner.lot, (question,))]
+
+    def take(self) -> Bids | None:
+        """The bids of an auction that has closed, once; without any if nobody could be asked."""
+        bids, self._bids = self._bids, None
+        return bids
 
     def handle(self, event: Event, now_s: float) -> Iterable[Effect]:
         """Bid; take bids; close what is to be closed."""
+        self._closed = False
+        if self._bids is not None and not self._allegiance.leads(now_s):
+            self._bids = None
         match event:
             case Heard(_, envelope) if isinstance(envelope.body, Auction):
                 self._hear(envelope.body, envelope.sender, envelope.incarnation, now_s)
             case Heard(_, envelope) if isinstance(envelope.body, Bid):
-                self._take(envelope.sender, envelope.body)
+                self._count(envelope.sender, envelope.body)
             case JobDone(job=name) if name == DESCRIBING:
                 self._open(event, now_s)
             case JobDone(job=name) if name == BIDDING:
@@ -171,11 +185,11 @@ class Auctioneer:
         self._bid = Bid(epoch=order[0], auction=order[1], offers=done.result)
         reign = self._allegiance.reign
         if reign is not None and reign.epoch == self._bid.epoch:
-            self._take(self._name, self._bid)
+            self._count(self._name, self._bid)
         else:
             self._effects.append(Publish(self._bid))
 
-    def _take(self, bidder: str, bid: Bid) -> None:
+    def _count(self, bidder: str, bid: Bid) -> None:
         held, reign = self._held, self._allegiance.reign
         if held is None or reign is None or (bid.epoch, bid.auction) != (reign.epoch, held.number):
             return
@@ -190,14 +204,14 @@ class Auctioneer:
         return offer.aim < len(held.lot.aims) and known and bool(relays)
 
     def _close(self, held: _Held) -> None:
-        """Have the question answered with what has been offered; alone if nobody could be asked."""
+        """Keep what has been offered until it is asked for."""
         self._held = None
         missed = held.bidders - held.bids.keys()
         if missed and missed != self._missed:
             self._log(f"auction {held.number} closed without the bids of {', '.join(sorted(missed))}")
         self._missed = missed
-        question = held.question if held.lot is None else replace(held.question, bids=dict(sorted(held.bids.items())))
-        self._effects.append(Compute(held.job, self._planner.plan, (question,)))
+        self._closed = True
+        self._bids = Bids(() if held.lot is None else held.lot.aims, dict(sorted(held.bids.items())))
 
     def _log(self, text: str) -> None:
         self._effects.append(Record(LogLine(level="warning", text=text)))

@@ -6,14 +6,14 @@ link of its own is another one (:mod:`planning.own_edges`).
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.lot import Lot
+from agents.lot import Bids, Lot
 from agents.proposals import (
     AGENT,
     BASE,
@@ -25,7 +25,6 @@ from agents.proposals import (
     team_order,
     team_tree,
 )
-from agents.whereabouts import Aim
 from planning.own_edges import exchange_own, own_edges
 from protocol.messages import Offer
 from protocol.topology import in_words
@@ -76,17 +75,22 @@ class Bidder(Proposer):
             )  # fmt: skip
         return tuple(offers)
 
-    def award(self, aims: Sequence[Aim], bids: Mapping[str, Sequence[Offer]]) -> list[Proposal]:
+    def award(self, bids: Bids, robots: Collection[str]) -> list[Proposal]:
         """The best that was offered for each aim; those that need no relay are nobody's to offer.
 
         Args:
-            aims: of the auction.
-            bids: by bidder.
+            bids: of an auction.
+            robots: that can still be counted on.
         """
         won: list[Proposal] = []
-        for number, aim in enumerate(aims):
+        for number, aim in enumerate(bids.aims):
             direct = self._direct(aim)
-            offers = [(offer, name) for name, those in bids.items() for offer in those if offer.aim == number]
+            offers = [
+                (offer, name)
+                for name, those in bids.offers.items()
+                for offer in those
+                if offer.aim == number and all(relay.robot in robots for relay in offer.relays)
+            ]
             if direct is not None:
                 won.append(direct)
             elif offers:

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.bidding import Bidder
-from agents.lot import Lot
+from agents.lot import Bids, Lot
 from agents.outlook import Outlook
 from agents.proposals import Proposal, relays_in_words
 from agents.pursuit import Pursuit
@@ -154,7 +154,7 @@ class DeploymentPlanner:
         robots: Mapping[str, Point],
         previous: Plan | None,
         obstacles: Sequence[Point] = (),
-        bids: Mapping[str, Sequence[Offer]] | None = None,
+        bids: Bids | None = None,
     ) -> Plan:
         """Decide where every robot goes.
 
@@ -180,7 +180,7 @@ class DeploymentPlanner:
         relays = () if previous is None else tuple(place for place in previous.placements if not place.spare)
         standing = self._standing(agent, robots, relays, previous)
         names = [relay.robot for relay in relays if relay.robot in robots]
-        new = [] if bids is None else self._proposer.award(agent.aims, bids)
+        new = [] if bids is None else self._proposer.award(bids, robots)
         new = new or self._proposer.chains(agent, robots, names, obstacles)
         chosen = self._best(standing, new or [self._proposer.outward(now, robots, obstacles)], agent, robots)
         return self._complete(chosen, agent, robots, needed, previous, obstacles)

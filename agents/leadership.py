@@ -11,6 +11,7 @@ election free of what leading needs.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Final, Protocol
 
 from agents.agent_knowledge import AgentKnowledge
@@ -108,11 +109,23 @@ class Leadership:
                 duty.take(event, now_s)
         if duty is not None:
             duty.lead(now_s)
-            if (question := duty.ask(now_s, busy=self._asked is not None)) is not None:
+            question = self._ask(duty, now_s, effects)
+            if question is not None:
                 self._asked = duty
-                if self._auctioneer is None:
-                    effects.append(Compute(PLANNING, self._planner.plan, (question,)))
-                else:
-                    effects += self._auctioneer.hold(question, PLANNING)
+                effects.append(Compute(PLANNING, self._planner.plan, (question,)))
             effects += duty.collect()
         return effects
+
+    def _ask(self, duty: ReignDuty, now_s: float, effects: list[Effect]) -> Question | None:
+        """What to plan now; where there are auctions, after one."""
+        busy = self._asked is not None
+        if self._auctioneer is None:
+            return duty.ask(now_s, busy=busy)
+        bids = None if busy else self._auctioneer.take()
+        if bids is not None:
+            question = duty.ask_now(now_s)
+            return None if question is None else replace(question, bids=bids)
+        draft = duty.draft(now_s, busy=busy or self._auctioneer.busy)
+        if draft is not None:
+            effects += self._auctioneer.hold(draft)
+        return None

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from agents.whereabouts import Aim
 from protocol import messages
-from protocol.messages import Auction, Authority, Placement, Point, Warrant
+from protocol.messages import Auction, Authority, Offer, Placement, Point, Warrant
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +25,16 @@ class Lot:
     """The relays of the chain that there is, from the base outward."""
     obstacles: tuple[Point, ...] = ()
     """Where nobody can stand."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bids:
+    """What came of an auction."""
+
+    aims: tuple[Aim, ...]
+    """Of the lot: offers are numbered by these."""
+    offers: Mapping[str, Sequence[Offer]]
+    """By bidder."""
 
 
 def to_auction(lot: Lot, number: int, closes_in_s: float, authority: Authority, warrant: Warrant) -> Auction:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from agents.lot import Bids
 from agents.movement_authority import Onset
 from agents.target_set import TargetSet
-from protocol.messages import Offer, Point
+from protocol.messages import Point
 
 if TYPE_CHECKING:
     from agents.leader import Plan
@@ -40,8 +41,8 @@ class Question:
     """Where an agent may be that announces no way; None: nothing has been measured yet."""
     drift_m_s: Point = (0.0, 0.0)
     """How the middle of that set has been moving."""
-    bids: Mapping[str, Sequence[Offer]] | None = None
-    """What was offered in an auction, by bidder; None: there was none."""
+    bids: Bids | None = None
+    """What was offered in an auction held just before; None: there was none."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -161,8 +161,23 @@ class ReignDuty:
             now_s: the present time.
             busy: whether a question is being worked on, of this reign or one before.
         """
+        question = self.draft(now_s, busy=busy)
+        self._planning = self._planning or question is not None
+        return question
+
+    def draft(self, now_s: float, *, busy: bool) -> Question | None:
+        """What will be asked soon, as for :meth:`ask`; until then the team goes on."""
         due = self._replanning.due(now_s) or self._urgent
-        if not due or busy or self._pending is not None or not self._is_complete(now_s):
+        return self._question(now_s) if due and not busy else None
+
+    def ask_now(self, now_s: float) -> Question | None:
+        """What to plan, now that what was drafted has been prepared."""
+        question = self._question(now_s)
+        self._planning = self._planning or question is not None
+        return question
+
+    def _question(self, now_s: float) -> Question | None:
+        if self._pending is not None or not self._is_complete(now_s):
             return None
         agent = self._agent.look(now_s)
         if agent is None:
@@ -171,7 +186,6 @@ class ReignDuty:
         self._urgent = onset is None
         if onset is None:
             return None
-        self._planning = True
         return Question(
             way=agent.way,
             target=agent.target,

@@ -10,7 +10,7 @@ import pytest
 import maps
 from agents.auction import AGAIN_S, BIDDING, DESCRIBING, OPEN_S, Auctioneer
 from agents.leader import DeploymentPlanner, Plan
-from agents.lot import Lot, from_auction, to_auction
+from agents.lot import Bids, Lot, from_auction, to_auction
 from agents.planning_job import Question
 from agents.records import LogLine
 from agents.role import Compute, Heard, JobDone, Publish, Record, Woken
@@ -73,7 +73,7 @@ def test_what_all_bid_together_is_what_the_leader_finds_alone(planner: Deploymen
         alone = planner.plan(agent, robots, previous)
         lot = over_the_wire(planner.lot(agent, robots, previous))
         bids = {name: planner.bid(lot, name) for name in ("base", *robots)}
-        together = planner.plan(agent, robots, previous, (), bids)
+        together = planner.plan(agent, robots, previous, (), Bids(planner.lot(agent, robots, previous).aims, bids))
         exchanged += any(offer.added is not None for offers in bids.values() for offer in offers)
         assert together.edges == alone.edges, f"turn {turn}"
         assert together.placements == alone.placements, f"turn {turn}"
@@ -125,9 +125,6 @@ class FakePlanner:
     def bid(self, _lot: Lot, _bidder: str) -> tuple[Offer, ...]:
         return (offer(5.0),)
 
-    def plan(self, question: Question) -> Any:
-        return question
-
 
 def offer(cost: float, robot: str = "robot1", aim: int = 0) -> Offer:
     return Offer(
@@ -155,7 +152,7 @@ class Scene:
         self.auctioneer = Auctioneer(self.allegiance, FakePlanner(), "base")
         self.said: list[AnyBody] = []
         self.logs: list[str] = []
-        self.answered: list[Question] = []
+        self.answered: list[Bids] = []
 
     def carry_out(self, effects: Any, now_s: float) -> None:
         for effect in list(effects):
@@ -166,10 +163,10 @@ class Scene:
                     self.logs.append(text)
                 case Compute(job=job, function=function, arguments=arguments):
                     result = function(*arguments)
-                    if job in (DESCRIBING, BIDDING):
-                        self.tell(JobDone(job, result, 0.01), now_s)
-                    else:
-                        self.answered.append(result)
+                    assert job in (DESCRIBING, BIDDING)
+                    self.tell(JobDone(job, result, 0.01), now_s)
+        if (bids := self.auctioneer.take()) is not None:
+            self.answered.append(bids)
 
     def tell(self, event: Any, now_s: float) -> None:
         self.carry_out(self.auctioneer.handle(event, now_s), now_s)
@@ -177,21 +174,23 @@ class Scene:
 
 def test_an_auction_closes_when_all_have_bid() -> None:
     scene = Scene("base", leads=True)
-    scene.carry_out(scene.auctioneer.hold(question(), "planning"), 10.0)
+    scene.carry_out(scene.auctioneer.hold(question()), 10.0)
     auctions = [body for body in scene.said if isinstance(body, Auction)]
     assert len(auctions) == 1 and auctions[0].closes_in_s == pytest.approx(OPEN_S)
     for robot in ("robot1", "robot2"):
         assert not scene.answered
         scene.tell(heard(robot, Bid(epoch=1, auction=auctions[0].auction, offers=(offer(4.0),))), 10.05)
     (answer,) = scene.answered
-    assert answer.bids is not None and set(answer.bids) == {"base", "robot1", "robot2"}
+    assert set(answer.offers) == {"base", "robot1", "robot2"}
+    assert scene.auctioneer.next_s == float("-inf")
+    scene.tell(Woken((0.0, 0.0)), 10.05)
     assert scene.auctioneer.next_s == float("inf") and not scene.logs
 
 
 def test_what_is_missing_is_not_waited_for_and_is_said_once() -> None:
     scene = Scene("base", leads=True)
     for start_s in (10.0, 20.0):
-        scene.carry_out(scene.auctioneer.hold(question(), "planning"), start_s)
+        scene.carry_out(scene.auctioneer.hold(question()), start_s)
         number = next(body.auction for body in reversed(scene.said) if isinstance(body, Auction))
         scene.tell(heard("robot1", Bid(epoch=1, auction=number, offers=())), start_s + 0.01)
         scene.tell(heard("robot2", Bid(epoch=1, auction=number - 1, offers=(offer(1.0),))), start_s + 0.02)
@@ -201,17 +200,20 @@ def test_what_is_missing_is_not_waited_for_and_is_said_once() -> None:
         scene.tell(heard("robot2", Bid(epoch=1, auction=number, offers=(offer(1.0, aim=7),))), start_s + 0.02)
         scene.tell(Woken((0.0, 0.0)), start_s + AGAIN_S)
         scene.tell(Woken((0.0, 0.0)), start_s + OPEN_S)
-    assert [set(answer.bids or ()) for answer in scene.answered] == [{"base", "robot1"}] * 2
+    assert [set(answer.offers) for answer in scene.answered] == [{"base", "robot1"}] * 2
     assert [text for text in scene.logs if "robot2" in text] == ["auction 1 closed without the bids of robot2"]
     assert sum(isinstance(body, Auction) for body in scene.said) == 4
 
 
-def test_a_leader_that_is_deposed_still_has_its_question_answered() -> None:
+def test_bids_of_a_leader_that_is_deposed_are_dropped_and_nobody_is_kept_waiting() -> None:
     scene = Scene("base", leads=True)
-    scene.carry_out(scene.auctioneer.hold(question(), "planning"), 10.0)
+    scene.carry_out(scene.auctioneer.hold(question()), 10.0)
+    assert scene.auctioneer.busy
     scene.allegiance.office = None
+    scene.auctioneer.handle(Woken((0.0, 0.0)), 10.01)
+    assert scene.auctioneer.next_s == float("-inf")
     scene.tell(Woken((0.0, 0.0)), 10.01)
-    assert len(scene.answered) == 1
+    assert not scene.answered and not scene.auctioneer.busy and scene.auctioneer.next_s == float("inf")
 
 
 def test_a_bid_is_made_once_and_said_as_often_as_it_is_asked_for() -> None:
