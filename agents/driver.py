@@ -39,8 +39,10 @@ class RobotDriver(Protocol):
         """Where the body is: metres, map frame."""
 
     def ranges(self) -> Sequence[Ranged]:
-        """What its radio has measured since this was asked last: in line of sight, and no more often than the mission's
-        ``ranging.rate_hz``, lest the others take it for made up."""
+        """What its radio has measured since this was asked last, in line of sight.
+
+        No more often than the mission's ``ranging.rate_hz``, lest the others take it for made up.
+        """
 
     def drive(self, velocity: Point, for_s: float) -> None:
         """Move at ``velocity`` (m/s, map frame) for at most ``for_s``, then stand: a mind that hangs drives no body."""
