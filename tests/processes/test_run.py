@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -140,10 +141,13 @@ def test_a_run_from_start_to_recording(start: Callable[[], Run], monkeypatch: py
     assert (accepted.returncode, accepted.stderr) == (0, "")
     assert "14, 5" in accepted.stdout
 
-    os.kill(peers["robot1"], signal.SIGKILL)
-    run.says("robot1 was killed by SIGKILL; restarting it (1 of 3)")
-    wait_for(lambda: processes_of(run.folder).get("robot1", peers["robot1"]) != peers["robot1"], "robot1 to return")
-    wait_for((run.files / "recordings" / "robot1.1.rrd").is_file, "a recording of the new process")
+    # The leader is killed from another terminal: a robot takes over, and the base station's process comes back.
+    killed = run.sightline("fault", "runs/trial", "kill", "leader", "--for", "0.5")
+    assert (killed.returncode, killed.stdout) == (0, "base is killed.\n"), killed.stderr
+    run.says("base is killed for 0.5 s")
+    wait_for(lambda: re.search(r"robot[12] leads", run.output), "a robot to lead")
+    wait_for((run.files / "recordings" / "base.1.rrd").is_file, "a recording of the new base station")
+
     run.says("agent to 14.0, 5.0")
     time.sleep(3.0)  # the agent walks, and the rest of the team with it
 
@@ -157,6 +161,11 @@ def test_a_run_from_start_to_recording(start: Callable[[], Run], monkeypatch: py
         assert (run.files / file).stat().st_size > 0, file
     metrics = json.loads((run.files / "metrics.json").read_text())
     assert metrics["robots"] == 2
+    takeover = metrics["takeovers"][0]
+    assert (takeover["before"], takeover["what"]) == ("base", "base is killed for 0.5 s")
+    assert takeover["after"] in ("robot1", "robot2")
+    assert metrics["leading_faults"] == []
+    assert "one leader at a time" in run.output
     assert metrics["since_first_deployment"]["agent_visible"] > 0.3
     assert metrics["agent_distance_m"] > 1.0
     for log in (run.files / "logs").glob("*.log"):
@@ -210,7 +219,9 @@ def test_what_cannot_run_starts_nothing_and_a_killed_launcher_leaves_nothing(sta
     assert failed.stderr.count("\n") == 1
     assert "base.position [8.5, 1] is inside a wall" in failed.stderr
     assert [folder.name for folder in (run.folder / "runs").iterdir() if not folder.is_symlink()] == ["trial"]
-    assert len(processes_of(run.folder)) == 4
+    peers = processes_of(run.folder)
+    assert len(peers) == 4
 
+    os.kill(peers["robot2"], signal.SIGSTOP)  # signals that can wait are not delivered to it any more
     run.launcher.kill()
     wait_for(lambda: not processes_of(run.folder), "all peers to end")
