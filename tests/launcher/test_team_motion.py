@@ -40,8 +40,8 @@ def mission(seed: int) -> Mission:
 class Stage:
     """A simulation that is looked at in between."""
 
-    def __init__(self, seed: int, *faults: Fault, loss: float = 0.0) -> None:
-        self.mission = mission(seed)
+    def __init__(self, seed: int, *faults: Fault, loss: float = 0.0, announces: bool = True) -> None:
+        self.mission = structs.replace(mission(seed), announces=announces)
         self.records: list[tuple[float, str, AnyRecord]] = []
         self.team = SimulatedTeam(
             self.mission,
@@ -121,6 +121,21 @@ def test_a_leader_that_dies_in_motion_is_replaced_and_the_team_drives_on(deaths:
     assert metrics.since_first_deployment.chain_connected > 0.9
     driven = [time_s for time_s, _, record in stage.records if isinstance(record, Ordered) and record.motion.revision]
     assert max(driven) > faults[-1].at_s + 2.0
+
+
+def test_the_chain_follows_an_agent_that_is_only_measured() -> None:
+    stage = Stage(3, announces=False)
+    stage.run(8.0)
+    assert stage.nearest_m > 0.4 - 1e-6
+    metrics = stage.measure()
+    assert not metrics.failures
+    assert metrics.agent_distance_m > 2.0
+    assert metrics.since_first_deployment is not None
+    assert metrics.since_first_deployment.chain_connected > 0.9
+    assert metrics.estimate is not None
+    assert metrics.estimate.contained == 1.0
+    assert metrics.estimate.area_median_m2 is not None
+    assert metrics.estimate.area_median_m2 < 5.0
 
 
 @pytest.mark.parametrize("loss", [0.1, 0.3])
