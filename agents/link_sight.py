@@ -67,7 +67,9 @@ def judge_links(scene: Scene, name: str, links: Sequence[NewLink]) -> tuple[Link
 
 
 def _judge(scene: Scene, name: str, link: NewLink) -> LinkView:
-    (other,) = (end for end in link.ends if end != name)
+    other = next((end for end in link.ends if end != name), name)
+    if other == name:
+        return LinkView(peer=name, verdict="refuses", reason=f"{name} cannot be linked to itself")
     stage = _first_stage(scene, link.ends)
     if stage is None:
         what = "where they stand" if scene.motion is None else "where they come to a stop"
