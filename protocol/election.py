@@ -108,7 +108,8 @@ class Election:
         self._outdated = self._failing = False
         self._leader_heard_s = -math.inf
         if name != roster.voters[0]:
-            self._leader_heard_s = now_s - LEASE_S / 2  # when a team starts the base station has half a lease to be there
+            # When a team starts the base station has half a lease to be there.
+            self._leader_heard_s = now_s - LEASE_S / 2
         self._waiting_since_s = self._patience_s = self._candidate_until_s = self._next_round_s = math.inf
         self._effects: list[Effect] = []
 

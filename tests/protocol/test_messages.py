@@ -231,8 +231,8 @@ def motion_of(waypoints: int = 1, marks: int = 2, ways: int = 1, joined: int = 0
         joined=("robot1",) * joined,
     )  # fmt: skip
     body = Deployment(
-        authority=Authority(epoch=0, leader="base", sequence=1), warrant=Warrant(lease_s=1.0, marks=()), decision=1, placements=(), edges=(),
-        cost=0.0, relays_needed=0, reason="", motion=motion,
+        authority=Authority(epoch=0, leader="base", sequence=1), warrant=Warrant(lease_s=1.0, marks=()), decision=1,
+        placements=(), edges=(), cost=0.0, relays_needed=0, reason="", motion=motion,
     )  # fmt: skip
     return encode(Envelope(sender="base", incarnation=0, sequence=1, sent_at_s=0.0, body=body))
 
