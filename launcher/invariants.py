@@ -2,8 +2,8 @@
 
 The rules see more than any peer does: true time, all minds, all disks. They are told by what peers say and by what they
 hold to be true; none of them asks the code that they judge whether it did right. Each kind of rule is a class of its
-own: leases and obedience here, orders and motion in :mod:`launcher.order_rules`, trees in :mod:`launcher.tree_rules`;
-how soon a team recovers is for :mod:`launcher.recovery_rules`.
+own: leases and obedience here, orders and motion in :mod:`launcher.order_rules`, trees in :mod:`launcher.tree_rules`,
+bodies in :mod:`launcher.body_rules`; how soon a team recovers is for :mod:`launcher.recovery_rules`.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from agents.allegiance import Allegiance
 from agents.mission import Mission
 from agents.shared_estimate import SharedEstimate
 from agents.shell import PeerShell
+from launcher.body_rules import BodyRules
 from launcher.fault_timetable import Kill, Timetable
 from launcher.kept_memory import count_kept
 from launcher.order_rules import MotionRules, OrderRules
@@ -66,6 +67,7 @@ class Invariants:
         self._found: Violation | None = None
         for peer in team.peers.values():
             peer.said, peer.watch = self._hear, self._look
+        BodyRules(mission, team)
         team.time.call_at(LOOK_S, self._look_at_sets)
         team.time.call_at(COUNT_S, self._look_at_memory)
 
