@@ -47,6 +47,9 @@ AGAIN_S: Final = 0.2
 PACE_S: Final = 0.04
 """Deployments are at least so far apart, however much there is to release."""
 
+REST_S: Final = 0.1
+"""After a tree was given up the next is planned so much later: else one that is refused at once busies the leader."""
+
 
 @dataclass(frozen=True, slots=True)
 class _Pending:
@@ -113,6 +116,8 @@ class ReignDuty:
         self._advance: Advance | None = None
         """What was recorded last."""
         self._planning, self._urgent = False, True
+        self._rests_until_s = math.inf
+        """A tree has just been given up: it is not planned again before. Infinite: none has."""
         self._complaints: dict[str, str] = {}
         """What was wrong last, by what it was about; said once, however often it happens."""
         self._effects: list[Effect] = []
@@ -120,7 +125,7 @@ class ReignDuty:
     @property
     def next_s(self) -> float:
         """When there is something to do."""
-        return min(self._replanning.next_s, self._say_at_s)
+        return min(self._replanning.next_s, self._say_at_s, self._rests_until_s)
 
     def lead(self, now_s: float) -> None:
         """Learn what is new, and say what is due."""
@@ -168,6 +173,10 @@ class ReignDuty:
     def draft(self, now_s: float, *, busy: bool) -> Question | None:
         """What will be asked soon, as for :meth:`ask`; until then the team goes on."""
         due = self._replanning.due(now_s) or self._urgent
+        if now_s < self._rests_until_s < math.inf:
+            self._urgent = due
+            return None
+        self._rests_until_s = math.inf
         return self._question(now_s) if due and not busy else None
 
     def ask_now(self, now_s: float) -> Question | None:
@@ -270,7 +279,7 @@ class ReignDuty:
     def _give_up(self, why: str, now_s: float) -> None:
         """Propose no more what is proposed, and plan afresh."""
         self._effects += self._tree.withdraw(why, now_s)
-        self._urgent = True
+        self._urgent, self._rests_until_s = True, now_s + REST_S
 
     @property
     def _base_there(self) -> bool:
