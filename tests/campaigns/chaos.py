@@ -46,6 +46,7 @@ class Result:
     faults: tuple[str, ...]
     led_after_s: float
     planned_after_s: float
+    went_back: int
 
 
 def run_one(what: tuple[str, int]) -> Result:
@@ -57,7 +58,7 @@ def run_one(what: tuple[str, int]) -> Result:
     return Result(
         kind, seed, "" if verdict.broken is None else str(verdict.broken), case.robots + 2, verdict.ended_s,
         time.process_time() - begun_s, verdict.published, tuple(fault.kind for fault in case.faults),
-        verdict.led_after_s, verdict.planned_after_s,
+        verdict.led_after_s, verdict.planned_after_s, verdict.went_back,
     )  # fmt: skip
 
 
@@ -98,6 +99,7 @@ def report(results: Sequence[Result]) -> None:
         f"{broken} broken"
     )
     print("  faults: " + ", ".join(f"{count} {kind}" for kind, count in kinds.most_common()))
+    print(f"  robots that nobody led went back in {sum(result.went_back > 0 for result in results)} missions")
     print(f"  CPU: {cpu_s / len(results):.2f} s a mission, {virtual_s / cpu_s:.0f} times faster than real time")
     for what, times in (
         ("led", [result.led_after_s for result in results]),

@@ -8,7 +8,7 @@ from hashlib import sha256
 
 import msgspec
 
-from agents.records import AnyRecord, LogLine, Mishap
+from agents.records import AnyRecord, LogLine, Mishap, Track
 from launcher.fault_timetable import Disk
 from launcher.invariants import Invariants
 from launcher.recovery_rules import RecoveryRules
@@ -33,6 +33,8 @@ class Verdict:
     planned_after_s: float = math.nan
     """From the last fault until all had a plan."""
     published: int = 0
+    went_back: int = 0
+    """How many robots that nobody led went back."""
     history: list[Record] = field(default_factory=list, repr=False)
 
     def digest(self) -> str:
@@ -63,7 +65,11 @@ def run_chaos(case: ChaosCase, *, keep: bool = True) -> Verdict:
     casting = real_casting(mission) if case.map else LightCasting(mission)
     history: list[Record] = []
 
+    went_back: set[str] = set()
+
     def record(time_s: float, peer: str, what: AnyRecord) -> None:
+        if isinstance(what, Track) and what.mode == "retreating":
+            went_back.add(peer)
         if keep:
             history.append((time_s, peer, what))
 
@@ -77,5 +83,11 @@ def run_chaos(case: ChaosCase, *, keep: bool = True) -> Verdict:
     except Violation as violation:
         broken = violation
     return Verdict(
-        broken, team.time.now_s, recovery.led_after_s, recovery.planned_after_s, team.network.published, history
+        broken,
+        team.time.now_s,
+        recovery.led_after_s,
+        recovery.planned_after_s,
+        team.network.published,
+        len(went_back),
+        history,
     )

@@ -8,7 +8,7 @@ from typing import Final, Literal
 
 import msgspec
 
-from agents.mission import Mission, RosterEntry, Scripted
+from agents.mission import Mission, Ranging, RosterEntry, Scripted
 from launcher.fault_timetable import (
     LEADER,
     Clock,
@@ -33,8 +33,22 @@ QUIET_S: Final = 8.0
 
 LONGEST_FAULT_S: Final = 6.0
 
+RETREATS_AFTER_S: Final = (5.0, 10.0, 86400.0)
+"""Robots go back after so long without a leader; the last of these is never."""
+
+BLEEDINGS: Final = 0.2
+"""Share of the missions in which so many voters die early that with one more there is no majority, and then one more
+does for long: what is left of the team may go back."""
+
+LEAST_BLEEDING_S: Final = 28.0
+"""In shorter missions nobody would have the time to go back."""
+
 BLACKOUTS: Final = 0.04
 """Share of the occasions on which all voters, or most of them, are killed at about the same time."""
+
+
+RANGING: Final = Ranging(noise_m=Ranging().bound_m)
+"""Ranges are as wrong as they may be."""
 
 
 class ChaosCase(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -48,6 +62,8 @@ class ChaosCase(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """When it is broken off; the end if not given."""
     announces: bool = True
     """Whether the agent does."""
+    retreat_after_s: float = 10.0
+    """When robots that nobody leads go back."""
     map: str = ""
     """A packaged map, with the full planner; none: the open room, with the light one."""
     faults: tuple[Fault, ...] = ()
@@ -86,6 +102,8 @@ class ChaosCase(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
             duration_s=self.duration_s,
             seed=self.seed,
             announces=self.announces,
+            retreat_after_s=self.retreat_after_s,
+            ranging=RANGING,
             epoch_unix_s=0.0,
             planning_delay_s=round(chance.choice((0.0, 0.02, 0.1, 0.3)), 3),
         )
@@ -103,19 +121,19 @@ def draw_case(
 
     Args:
         seed: of everything.
-        robots: least and greatest number of them; base station and agent come on top. Large teams are rarer, since
-            what they cost rises with the square of their size.
-        duration_s: least and greatest, seconds; long missions are rarer.
-        clocks: whether they may differ: where an estimate is shared they must not, but for a bound.
+        robots: least and greatest number of them; base station and agent come on top.
+        duration_s: least and greatest, seconds.
+        clocks: whether they may differ by more than those can that share an estimate.
     """
     chance = Random(f"{seed}/case")
-    count = robots[0] + int((robots[1] + 1 - robots[0]) * chance.random() ** 2)
-    ends_s = float(duration_s[0] + int((duration_s[1] + 1 - duration_s[0]) * chance.random() ** 2))
+    count, ends_s = chance.randint(*robots), float(chance.randint(*duration_s))
+    retreat_after_s = chance.choice(RETREATS_AFTER_S)
     voters = ("base", *robot_names(count))
     loses_disks = chance.random() < 0.15
     faults: list[Fault] = []
-    if clocks and chance.random() < 0.5:
-        faults += draw_clocks(chance, voters)
+    if chance.random() < 0.5:
+        faults += draw_clocks(chance, voters) if clocks else draw_close_clocks(chance, voters)
+    bleeds = draw_bleeding(chance, voters, ends_s) if chance.random() < BLEEDINGS and ends_s >= LEAST_BLEEDING_S else []
     begins_s = 0.0
     while True:
         begins_s += chance.expovariate(1.0 / chance.choice((0.3, 2.5)))
@@ -128,8 +146,10 @@ def draw_case(
             faults.append(draw_fault(chance, voters, _round(begins_s), for_s, loses_disks=loses_disks))
     if chance.random() < 0.1:
         faults.append(Kill(at_s=_round(chance.uniform(3.0, ends_s - QUIET_S)), who=chance.choice(voters)))
-    faults.sort(key=lambda fault: fault.at_s)
-    return ChaosCase(seed=seed, robots=count, duration_s=ends_s, faults=tuple(faults))
+    if bleeds:  # whoever else died or hung then would keep all others from going back
+        faults = [fault for fault in faults if not isinstance(fault, Kill | Pause)]
+    faults = sorted(faults + bleeds, key=lambda fault: fault.at_s)
+    return ChaosCase(seed=seed, robots=count, duration_s=ends_s, retreat_after_s=retreat_after_s, faults=tuple(faults))
 
 
 def draw_clocks(chance: Random, voters: Sequence[str]) -> list[Fault]:
@@ -138,6 +158,26 @@ def draw_clocks(chance: Random, voters: Sequence[str]) -> list[Fault]:
     return [
         Clock(at_s=0.0, who=name, rate=chance.choice(rates), offset_s=_round(chance.uniform(-50.0, 50.0)))
         for name in voters
+    ]
+
+
+def draw_close_clocks(chance: Random, voters: Sequence[str]) -> list[Fault]:
+    """Clocks as far apart as those may be that share an estimate."""
+    bound_s = RANGING.clock_bound_s
+    return [
+        Clock(at_s=0.0, who=name, offset_s=_round(chance.choice((-0.5 * bound_s, 0.0, 0.5 * bound_s))))
+        for name in voters
+    ]
+
+
+def draw_bleeding(chance: Random, voters: Sequence[str], ends_s: float) -> list[Fault]:
+    """So many robots die early that with the next one, the base station, there is no majority for a while."""
+    minority = (len(voters) - 1) // 2
+    next_s = _round(chance.uniform(10.0, 14.0))
+    dead = chance.sample(voters[1:], minority)
+    return [
+        *(Kill(at_s=_round(chance.uniform(2.0, 4.0)), who=name) for name in dead),
+        Kill(at_s=next_s, for_s=_round(ends_s - QUIET_S - next_s - chance.uniform(0.0, 4.0)), who=voters[0]),
     ]
 
 
@@ -208,6 +248,7 @@ def write_case(case: ChaosCase) -> str:
         lines.append(f"ends_s = {case.ends_s}")
     if not case.announces:
         lines.append("announces = false")
+    lines.append(f"retreat_after_s = {case.retreat_after_s}")
     if case.map:
         lines.append(f'map = "{case.map}"')
     return "\n".join(lines) + "\n\n" + write_timetable(case.timetable)

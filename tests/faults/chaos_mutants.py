@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from copy import deepcopy
+from dataclasses import replace
 from typing import Any, Final, TypeAlias
 
 import pytest
@@ -12,10 +14,15 @@ from msgspec import structs
 from agents import dispatcher
 from agents.allegiance import Allegiance
 from agents.dispatcher import Dispatcher
+from agents.mission import Ranging
 from agents.movement_authority import MovementAuthority
+from agents.ranging import Transponder
 from agents.robot import Robot
+from agents.shared_estimate import SharedEstimate
 from agents.shell import PeerShell
+from agents.sighted_set import SightedSet
 from agents.stage_follower import StageFollower
+from estimation.shared_ranges import SharedRanges
 from protocol.ballot import Ballot
 from protocol.core import Persist
 from protocol.election import LEASE_S, Election
@@ -25,6 +32,7 @@ from protocol.negotiation import Negotiation
 from protocol.obedience import Obedience
 from protocol.roster import Roster
 from protocol.voter import Voter
+from tests.faults.light_team import LightPlanner
 
 Patch: TypeAlias = pytest.MonkeyPatch
 Mutant: TypeAlias = Callable[[Patch], None]
@@ -275,3 +283,86 @@ def fails_on_a_vanished_peer(patch: Patch) -> None:
         return handle(self, event, now_s)
 
     patch.setattr(Robot, "handle", handle_badly)
+
+
+@_mutant
+def forgets_the_round_trip(patch: Patch) -> None:
+    """Takes an answer for as good as it was when the agent measured, however long it was on its way."""
+    measured = SharedEstimate.measured
+
+    def measured_exactly(self: Any, anchor: Any, range_m: float, _bound_m: float, now_s: float) -> Any:
+        return measured(self, anchor, range_m, Ranging().bound_m, now_s)
+
+    patch.setattr(SharedEstimate, "measured", measured_exactly)
+
+
+@_mutant
+def forgets_the_clock_bound(patch: Patch) -> None:
+    """Takes all clocks for one."""
+    begin = SharedRanges.__init__
+
+    def begin_with_one_clock(self: Any, *arguments: Any, **named: Any) -> None:
+        begin(self, *arguments, **named)
+        self._widening = 0.0
+
+    patch.setattr(SharedRanges, "__init__", begin_with_one_clock)
+
+
+@_mutant
+def predicts_half_the_walk(patch: Patch) -> None:
+    """Takes the agent to walk at half its speed."""
+    predict = SightedSet.predict
+    patch.setattr(SightedSet, "predict", lambda self, distance_m: predict(self, 0.5 * distance_m))
+
+
+@_mutant
+def stamps_ranges_on_arrival(patch: Patch) -> None:
+    """Takes what others have measured for measured when it is heard of."""
+    receive = SharedRanges.receive
+
+    def receive_now(self: Any, records: Any, now_s: float = math.inf) -> int:
+        stamped = records if now_s == math.inf else [replace(record, time_s=now_s) for record in records]
+        return receive(self, stamped, now_s)
+
+    patch.setattr(SharedRanges, "receive", receive_now)
+
+
+@_mutant
+def folds_at_the_present_time(patch: Patch) -> None:
+    """Takes the set in front of the log for that of the time at which it was folded."""
+    fold = SharedRanges._fold
+
+    def fold_for_now(self: Any, records: Any, given_up: int) -> None:
+        fold(self, records, given_up)
+        key, state = self._base
+        self._base = (max(self._last_s, key[0]), *key[1:]), state
+        self._now = self._base[0], deepcopy(state)
+        self._marks = []
+
+    patch.setattr(SharedRanges, "_fold", fold_for_now)
+
+
+@_mutant
+def believes_a_lying_radio(patch: Patch) -> None:
+    """No rule of ours left out, but one of the radio's: its ranges are up to three times as wrong as it says."""
+    reply = Transponder._reply
+
+    def lie(self: Any, asker: str, request: Any, position: Any) -> Any:
+        honest = reply(self, asker, request, position)
+        error_m = honest.range_m - math.dist(request.position, position)
+        return structs.replace(honest, range_m=max(0.0, honest.range_m + 2.0 * error_m))
+
+    patch.setattr(Transponder, "_reply", lie)
+
+
+@_mutant
+def sends_all_to_one_lane(patch: Patch) -> None:
+    """Plans as if robots had no bodies."""
+    deploy = LightPlanner._deploy
+
+    def deploy_in_one_lane(self: Any, *arguments: Any) -> Any:
+        plan = deploy(self, *arguments)
+        placements = tuple(structs.replace(place, position=(place.position[0], 1.0)) for place in plan.placements)
+        return replace(plan, placements=placements)
+
+    patch.setattr(LightPlanner, "_deploy", deploy_in_one_lane)

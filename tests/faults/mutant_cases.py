@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from typing import Final
 
-from launcher.fault_timetable import Cut, Delay, Disk, Fault, Kill, Loss, Partition
+from launcher.fault_timetable import Clock, Cut, Delay, Disk, Fault, Kill, Loss, Partition
 from tests.faults.chaos_mission import ChaosCase
 
 
-def _case(ends_s: float, *faults: Fault, robots: int = 2, seed: int = 1, duration_s: float = 30.0) -> ChaosCase:
-    return ChaosCase(seed=seed, robots=robots, duration_s=duration_s, ends_s=ends_s, faults=faults)
+def _case(
+    ends_s: float, *faults: Fault, robots: int = 2, seed: int = 1, duration_s: float = 30.0, announces: bool = True
+) -> ChaosCase:
+    return ChaosCase(seed=seed, robots=robots, duration_s=duration_s, ends_s=ends_s, announces=announces, faults=faults)
 
 
 VOTERS = ("base", "robot1", "robot2")
 
 BLACKOUT: Final = tuple(Kill(at_s=4.0, for_s=1.0, who=name) for name in VOTERS)
 """All die at once, and begin again."""
+
+INSIDE: Final = "the agent is inside every set"
 
 OLD_VOTES: Final = (
     Delay(at_s=3.0, hearers=("base",), least_s=0.6, mean_s=0.0),
@@ -115,6 +119,37 @@ CASES: Final[dict[str, tuple[str, ChaosCase]]] = {
         _case(12.0, Kill(at_s=3.0, for_s=0.5, who="leader")),
     ),
     "remembers_everything": ("memory is bounded", _case(26.0, robots=1)),
+    "forgets_the_round_trip": (
+        INSIDE,
+        _case(14.0, Delay(at_s=0.0, speakers=("agent",), least_s=0.25, mean_s=0.0), robots=1, announces=False),
+    ),
+    "forgets_the_clock_bound": (
+        INSIDE,
+        _case(
+            20.0,
+            Clock(at_s=0.0, who="base", offset_s=-0.025),
+            Clock(at_s=0.0, who="robot1", offset_s=0.025),
+            robots=1,
+            seed=3,
+            announces=False,
+        ),
+    ),
+    "predicts_half_the_walk": (
+        INSIDE,
+        _case(8.0, Cut(at_s=3.0, speakers=("agent",)), robots=1, announces=False),
+    ),
+    "stamps_ranges_on_arrival": (
+        INSIDE,
+        _case(
+            12.0,
+            Delay(at_s=0.0, speakers=("base",), hearers=("robot1",), least_s=1.5, mean_s=0.0),
+            robots=1,
+            announces=False,
+        ),
+    ),
+    "folds_at_the_present_time": (INSIDE, _case(16.0, robots=1, announces=False)),
+    "believes_a_lying_radio": (INSIDE, _case(10.0, robots=1, announces=False)),
+    "sends_all_to_one_lane": ("robots do not touch", _case(10.0)),
     "fails_on_a_vanished_peer": ("roles fail on nothing", _case(4.0, Kill(at_s=3.0, who="agent"))),
 }
 """By mutant: the rule that it breaks, and where."""

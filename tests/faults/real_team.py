@@ -14,7 +14,7 @@ from agents.leader import DeploymentPlanner
 from agents.mission import Mission, RosterEntry, Wandering
 from planning.environment import Environment
 from protocol.messages import Point
-from tests.faults.chaos_mission import ChaosCase, draw_case, robot_names
+from tests.faults.chaos_mission import RANGING, ChaosCase, draw_case, robot_names
 from tests.faults.light_team import RADIUS_M
 
 MAPS: Final = ("office", "room3", "maze")
@@ -54,6 +54,8 @@ def real_mission(case: ChaosCase) -> Mission:
         duration_s=case.duration_s,
         seed=case.seed,
         announces=case.announces,
+        retreat_after_s=case.retreat_after_s,
+        ranging=RANGING,
         epoch_unix_s=0.0,
         planning_delay_s=0.2,
     )

@@ -10,12 +10,14 @@ import pytest
 from agents.records import Office
 from launcher.fault_timetable import Kill, Loss, Partition
 from tests.faults.chaos import run_chaos
-from tests.faults.chaos_mission import ChaosCase, draw_case, read_case, write_case
+from tests.faults.chaos_mission import LONGEST_FAULT_S, ChaosCase, draw_case, read_case, write_case
 from tests.faults.chaos_mutants import MUTANTS
 from tests.faults.mutant_cases import CASES
 from tests.faults.shrinking import shrink
 
 SEEDS = range(1000, 1010)
+
+RETREATING = 82
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -33,6 +35,15 @@ def test_the_missions_are_hard() -> None:
     reigns = {record.leads for _, _, record in verdict.history if isinstance(record, Office)} - {None}
     assert len(reigns) > 1
     assert verdict.planned_after_s < 10.0
+
+
+def test_in_some_missions_robots_go_back() -> None:
+    """Where so many voters are dead that there is no majority; none of the rules is broken by that."""
+    case = draw_case(RETREATING)
+    assert case.retreat_after_s < LONGEST_FAULT_S
+    verdict = run_chaos(case, keep=False)
+    assert verdict.broken is None, write_case(case)
+    assert verdict.went_back > 0
 
 
 @pytest.mark.parametrize("name", MUTANTS)
