@@ -3,7 +3,8 @@
 A launcher that has checked a scenario has imported nearly everything that a peer needs and has loaded the compiled
 kernels. Its forks have all that at once and share the memory, where processes from scratch would spend two seconds of a
 processor each. A fork is sound only before the launcher runs an event loop, a bus, a recording or a thread of its own;
-the idle threads that rerun and pyarrow start on import provide for forks themselves.
+the idle threads that rerun and pyarrow start on import provide for forks themselves. Later ones are taken of a process
+that has stayed so (:mod:`launcher.fork_server`), and from scratch only if that one is lost.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import os
 import sys
 import time
 from pathlib import Path
+from typing import NoReturn
 
 from agents import runtime
 from agents.leader import DeploymentPlanner
@@ -38,21 +40,31 @@ def fork_peer(arguments: list[str], log: Path, planner: DeploymentPlanner) -> in
     sys.stdout.flush()
     sys.stderr.flush()
     pid = os.fork()
-    if pid != 0:
-        return pid
+    if pid == 0:
+        be_peer(arguments, log, planner)
+    return pid
+
+
+def be_peer(arguments: list[str], log: Path, planner: DeploymentPlanner) -> NoReturn:
+    """Be a peer in this process, which is a fork; it ends in here. Arguments as of :func:`fork_peer`."""
     try:
-        os.setsid()
-        for path, flags, descriptors in (
-            (os.devnull, os.O_RDONLY, (0,)),
-            (str(log), os.O_WRONLY | os.O_APPEND | os.O_CREAT, (1, 2)),
-        ):
-            opened = os.open(path, flags, 0o644)
-            for descriptor in descriptors:
-                os.dup2(opened, descriptor)
-            os.close(opened)
+        leave_launcher(log)
         runtime.main(arguments, planner)
     finally:
         os._exit(1)  # whatever happens, this is not the launcher any more
+
+
+def leave_launcher(log: Path) -> None:
+    """Have a session of one's own and write to the log only, instead of where the launcher does."""
+    os.setsid()
+    for path, flags, descriptors in (
+        (os.devnull, os.O_RDONLY, (0,)),
+        (str(log), os.O_WRONLY | os.O_APPEND | os.O_CREAT, (1, 2)),
+    ):
+        opened = os.open(path, flags, 0o644)
+        for descriptor in descriptors:
+            os.dup2(opened, descriptor)
+        os.close(opened)
 
 
 def spawn(command: list[str], log: Path) -> int:

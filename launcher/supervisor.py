@@ -24,6 +24,7 @@ from agents.leader import DeploymentPlanner
 from agents.mission import Mission
 from agents.runtime import WOULD_JOIN_WRONGLY
 from agents.voter_file import VoterFile
+from launcher.fork_server import ForkServer, ServerGone
 from launcher.processes import fork_peer, spawn, wait_for_end
 from launcher.run_folder import RECORDINGS
 from protocol.messages import Point
@@ -97,6 +98,8 @@ class Supervisor:
         self._stopping = asyncio.Event()
         self._watchers: list[asyncio.Task[None]] = []
         self._paused: dict[str, asyncio.TimerHandle] = {}
+        self._forks: ForkServer | None = None
+        """Starts peers again, as long as there is one."""
 
     def launch(self) -> None:
         """Start a process for every peer. Call it before there is an event loop, a bus or a thread: it forks."""
@@ -104,6 +107,7 @@ class Supervisor:
         (self._folder / RECORDINGS).mkdir(exist_ok=True)
         for peer in self.peers.values():
             peer.pid = self.start_process(peer)
+        self._forks = ForkServer(self._planner)
 
     def watch(self) -> None:
         """Restart from now on what crashes. Needs the event loop that :meth:`stop` runs in."""
@@ -153,6 +157,8 @@ class Supervisor:
             self._announce(f"killed, because they did not end within {TERMINATE_S:g} s: {names}")
             self._signal(signal.SIGKILL)
             await asyncio.wait(late)
+        if self._forks is not None:
+            self._forks.close()
 
     def start_process(self, peer: Peer) -> int:
         """Start a process for a peer's present incarnation and return its id."""
@@ -164,6 +170,12 @@ class Supervisor:
         ]
         if peer.incarnation == 0:
             return fork_peer(arguments, self.log(peer), self._planner)
+        if self._forks is not None:
+            try:
+                return self._forks.fork_peer(arguments, self.log(peer))
+            except ServerGone:
+                self._forks = None
+                self._announce("the process that forks peers is gone: those started from now on take seconds longer")
         # With -P, whatever the user's own folder holds, `agents` means ours.
         return spawn([sys.executable, "-P", "-m", "agents.runtime", *arguments], self.log(peer))
 

@@ -15,8 +15,10 @@ from agents.leader import DeploymentPlanner
 from agents.mission import Mission
 from agents.runtime import WOULD_JOIN_WRONGLY
 from agents.voter_file import VoterFile
+from launcher import fork_server
 from launcher import supervisor as supervision
-from launcher.processes import spawn
+from launcher.fork_server import ForkServer, ServerGone
+from launcher.processes import spawn, wait_for_end
 from launcher.supervisor import Peer, Supervisor
 from planning.environment import Environment
 
@@ -66,7 +68,7 @@ def exists(pid: int) -> bool:
 
 def logged(folder: Path, name: str) -> list[str]:
     file = folder / "logs" / f"{name}.log"
-    return file.read_text().splitlines() if file.exists() else []
+    return file.read_text().split("\n")[:-1] if file.exists() else []  # lines that are complete
 
 
 def test_what_crashes_is_restarted_with_the_next_incarnation_until_it_is_given_up(
@@ -218,3 +220,48 @@ def test_a_paused_peer_goes_on_by_itself_and_can_be_stopped_in_order(
 
     asyncio.run(play())
     assert said == []
+
+
+@pytest.fixture
+def planner() -> DeploymentPlanner:
+    return DeploymentPlanner(ROOM, (1.0, 1.0), 0.2, "inflection")
+
+
+def test_the_fork_server_forks_children_of_whoever_asks(
+    planner: DeploymentPlanner, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with capfd.disabled():  # forks shall have the real sys.stdout
+        server = ForkServer(planner)
+    try:
+        for incarnation in (1, 2):  # there is no mission, which ends the peer with a status of its own
+            arguments = [str(tmp_path / "none.json"), "robot1", "--incarnation", str(incarnation)]
+            pid = server.fork_peer([*arguments, "--launcher", str(os.getpid())], tmp_path / f"{incarnation}.log")
+            assert asyncio.run(wait_for_end(pid)) == 1
+            said = (tmp_path / f"{incarnation}.log").read_text()
+            assert said.startswith(f"--- robot1, incarnation {incarnation}, process {pid}\n")
+            assert "FileNotFoundError" in said
+    finally:
+        server.close()
+    assert not exists(server.pid)
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_fork_server_that_does_not_answer_is_done_without(
+    number: signal.Signals, mission: Mission, planner: DeploymentPlanner, tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    monkeypatch.setattr(fork_server, "ANSWER_WITHIN_S", 0.2)
+    said: list[str] = []
+    team = Supervisor(mission, tmp_path, planner, said.append, lambda *_: None, lambda _: None)
+    (tmp_path / "logs").mkdir()
+    server = team._forks = ForkServer(planner)
+    os.kill(server.pid, number)
+    peer = Peer("robot1", incarnation=1)
+    pids = [team.start_process(peer) for _ in range(2)]
+    assert [asyncio.run(wait_for_end(pid)) for pid in pids] == [1, 1], "for want of a mission"
+    assert said == ["the process that forks peers is gone: those started from now on take seconds longer"]
+    heads = [line for line in logged(tmp_path, "robot1") if line.startswith("---")]
+    assert sorted(heads) == sorted(f"--- robot1, incarnation 1, process {pid}" for pid in pids)
+    assert not exists(server.pid)
+    with pytest.raises(ServerGone):
+        server.fork_peer([], tmp_path / "log")

@@ -17,6 +17,7 @@ import pytest
 from typer.testing import CliRunner
 
 from launcher.cli import app
+from launcher.fork_server import NAME as FORKS
 from launcher.supervisor import TERMINATE_S
 
 pytestmark = [pytest.mark.processes, pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")]
@@ -44,7 +45,7 @@ speed_m_s = 2.0
 
 
 def processes_of(folder: Path) -> dict[str, int]:
-    """Peers of the run in a folder that have a process, and its id."""
+    """Peers of the run in a folder that have a process, and its id; the process that forks them again, too."""
     found = {}
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit():
@@ -123,7 +124,11 @@ def test_a_run_from_start_to_recording(start: Callable[[], Run], monkeypatch: py
     run = start()
     run.says("First deployment obeyed")
     peers = processes_of(run.folder)
-    assert set(peers) == {"base", "agent", "robot1", "robot2"}
+    assert set(peers) == {"base", "agent", "robot1", "robot2", FORKS}
+    held = [str(entry.readlink()) for entry in Path(f"/proc/{peers[FORKS]}/fd").iterdir()]
+    network = {line.split()[9] for line in Path("/proc/net/tcp").read_text().splitlines()[1:]}
+    assert not network & {name.removeprefix("socket:[").rstrip("]") for name in held}, held
+    assert not any("logs" in name or "recordings" in name or "output.txt" in name for name in held), held
 
     refused = run.sightline("goal", "8.5,5")
     assert refused.returncode == 2
@@ -147,6 +152,10 @@ def test_a_run_from_start_to_recording(start: Callable[[], Run], monkeypatch: py
     run.says("base is killed for 0.5 s")
     wait_for(lambda: re.search(r"robot[12] leads", run.output), "a robot to lead")
     wait_for((run.files / "recordings" / "base.1.rrd").is_file, "a recording of the new base station")
+    again = processes_of(run.folder)["base"]
+    assert again != peers["base"]
+    command = Path(f"/proc/{run.launcher.pid}/cmdline").read_bytes()
+    assert Path(f"/proc/{again}/cmdline").read_bytes() == command, "it is a fork"
 
     run.says("agent to 14.0, 5.0")
     time.sleep(3.0)  # the agent walks, and the rest of the team with it
@@ -183,6 +192,7 @@ def test_a_run_from_start_to_recording(start: Callable[[], Run], monkeypatch: py
 SIGNALLED = """
 import os, signal, sys
 from launcher.cli import app
+from launcher.fork_server import NAME as FORKS
 from launcher.supervisor import TERMINATE_S
 from launcher.supervisor import Supervisor
 launch = Supervisor.launch
@@ -209,7 +219,7 @@ def test_a_signal_during_the_start_stops_the_team_in_order(tmp_path: Path) -> No
 
 def test_what_cannot_run_starts_nothing_and_a_killed_launcher_leaves_nothing(start: Callable[[], Run]) -> None:
     run = start()
-    wait_for(lambda: len(processes_of(run.folder)) == 4, "four processes")
+    wait_for(lambda: len(processes_of(run.folder)) == 5, "four peers, and what forks them again")
     again = run.sightline("run", "trial.toml", "--name", "trial")
     assert again.returncode == 2
     assert "runs/trial exists" in again.stderr
@@ -220,8 +230,13 @@ def test_what_cannot_run_starts_nothing_and_a_killed_launcher_leaves_nothing(sta
     assert "base.position [8.5, 1] is inside a wall" in failed.stderr
     assert [folder.name for folder in (run.folder / "runs").iterdir() if not folder.is_symlink()] == ["trial"]
     peers = processes_of(run.folder)
-    assert len(peers) == 4
+    assert len(peers) == 5
 
-    os.kill(peers["robot2"], signal.SIGSTOP)  # signals that can wait are not delivered to it any more
+    os.kill(peers["robot1"], signal.SIGKILL)
+    run.says("robot1 was killed by SIGKILL; restarting it (1 of 3)")
+    wait_for((run.files / "recordings" / "robot1.1.rrd").is_file, "another process of robot1")
+    peers = processes_of(run.folder)
+    for name in ("robot1", "robot2"):  # one of the second process' forks, and one of the launcher's
+        os.kill(peers[name], signal.SIGSTOP)  # signals that can wait are not delivered to it any more
     run.launcher.kill()
     wait_for(lambda: not processes_of(run.folder), "all peers to end")
