@@ -6,10 +6,13 @@ second), so a peer that joins late, or lost messages, has all of it within a sec
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import groupby, takewhile
 
 from agents.allegiance import Allegiance
+from agents.retreat import MEMORY
 from agents.role import Effect, Event, Heard
 from protocol.membership import Presence
 from protocol.messages import Intent, Point, State
@@ -38,14 +41,30 @@ class Collection:
         self._allegiance = allegiance
         self._agent = agent
         self._known: dict[str, Known] = {}
+        self._behind: dict[str, deque[Point]] = {}
+        """Where each robot has come by in its present plan, the oldest place first."""
 
     def handle(self, event: Event, _now_s: float) -> Iterable[Effect]:
         """Remember what is said."""
         if isinstance(event, Heard):
             peer, body = event.envelope.sender, event.envelope.body
             if isinstance(body, State) if peer != self._agent else isinstance(body, Intent):
+                if isinstance(body, State):
+                    self._follow(peer, body)
                 self._known[peer] = Known(body, event.envelope.incarnation)  # type: ignore[arg-type]
         return ()
+
+    def _follow(self, robot: str, now: State) -> None:
+        """Note by which waypoints a robot has come since it was heard last."""
+        behind = self._behind.setdefault(robot, deque(maxlen=MEMORY))
+        known = self._known.get(robot)
+        if _plan(now) is None or known is None or not isinstance(known.body, State) or _plan(known.body) != _plan(now):
+            behind.clear()
+        elif not _turned(now):
+            ahead = set(now.path[1:])
+            if not behind:
+                behind.append(known.body.position)
+            behind.extend(takewhile(lambda place: place not in ahead, known.body.path[1:]))
 
     def body(self, peer: str) -> State | Intent | None:
         """What a peer says of itself; None if it is not there, or this process of it has said nothing yet."""
@@ -64,7 +83,34 @@ class Collection:
         body = self.body(self._agent)
         return body if isinstance(body, Intent) else None
 
-    def whereabouts(self, peer: str) -> tuple[Point, ...]:
-        """Where a peer may be that is not there any more: its last place and its way from there; empty if unknown."""
-        known = self._known.get(peer)
-        return () if known is None else tuple(dict.fromkeys((known.body.position, *known.body.path)))
+    def whereabouts(self, robot: str, own: State | None) -> tuple[Point, ...]:
+        """Where a robot may be that is not there any more; empty if unknown.
+
+        Its last place, its way from there, and, if it may have gone back unheard, where it had come by in its plan. It
+        has not while anybody who is there is in that plan and has not turned: all of a plan go back, or none.
+
+        Args:
+            robot: its name.
+            own: what this peer says of itself, if it is a robot.
+        """
+        known = self._known.get(robot)
+        if known is None:
+            return ()
+        places = [known.body.position, *known.body.path]
+        there = (own, *(self.state(other) for other in self._known if other != robot))
+        if isinstance(known.body, State) and not any(_holds_to(state, _plan(known.body)) for state in there):
+            places += [*reversed(places), *reversed(self._behind[robot])]
+        return tuple(place for place, _ in groupby(places))
+
+
+def _plan(state: State) -> tuple[int, int] | None:
+    return None if state.progress is None else (state.progress.epoch, state.progress.plan)
+
+
+def _holds_to(state: State | None, plan: tuple[int, int] | None) -> bool:
+    """Whether a robot is in a plan and has not turned."""
+    return state is not None and plan is not None and _plan(state) == plan and not _turned(state)
+
+
+def _turned(state: State) -> bool:
+    return state.progress is not None and state.progress.retreat is not None

@@ -27,6 +27,7 @@ from agents.records import Advance, Decision, LogLine, Ordered, Planned
 from agents.rhythm import EARLY_S, Rhythm
 from agents.role import Effect, JobDone, Publish, Record
 from agents.roll_call import Body, RollCall
+from agents.setbacks import Setbacks
 from agents.standing_orders import StandingOrders
 from agents.topology import TeamTree
 from protocol.membership import Presence
@@ -46,9 +47,6 @@ AGAIN_S: Final = 0.2
 
 PACE_S: Final = 0.04
 """Deployments are at least so far apart, however much there is to release."""
-
-REST_S: Final = 0.1
-"""After a tree was given up the next is planned so much later: else one that is refused at once busies the leader."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +95,8 @@ class ReignDuty:
         self._mission, self._allegiance, self._standing = mission, allegiance, orders
         self._agent, self._tree = agent, tree
         self._complete_by_s = complete_by_s
-        places = {robot.name: collection.whereabouts(robot.name) or (robot.start,) for robot in mission.robots}
+        own = None if body is None else body.state
+        places = {robot.name: collection.whereabouts(robot.name, own) or (robot.start,) for robot in mission.robots}
         base = mission.base_station
         self._dispatcher = Dispatcher(base.name, base.start, places, reign.epoch, mission.robot_radius_m)
         self._authority = Authority(epoch=reign.epoch, leader=reign.leader, sequence=0)
@@ -116,8 +115,8 @@ class ReignDuty:
         self._advance: Advance | None = None
         """What was recorded last."""
         self._planning, self._urgent = False, True
-        self._rests_until_s = math.inf
-        """A tree has just been given up: it is not planned again before. Infinite: none has."""
+        self._setbacks = Setbacks()
+        """Trees that were given up."""
         self._complaints: dict[str, str] = {}
         """What was wrong last, by what it was about; said once, however often it happens."""
         self._effects: list[Effect] = []
@@ -125,7 +124,7 @@ class ReignDuty:
     @property
     def next_s(self) -> float:
         """When there is something to do."""
-        return min(self._replanning.next_s, self._say_at_s, self._rests_until_s)
+        return min(self._replanning.next_s, self._say_at_s, self._setbacks.next_s)
 
     def lead(self, now_s: float) -> None:
         """Learn what is new, and say what is due."""
@@ -146,6 +145,8 @@ class ReignDuty:
         for robot in given_up:
             self._log("warning", f"{robot} does not answer: the team goes on without it")
         goal = self._agent.goal()
+        if changed:
+            self._setbacks.forget()
         self._urgent = self._urgent or changed or goal != self._goal
         self._goal = goal
 
@@ -172,11 +173,8 @@ class ReignDuty:
 
     def draft(self, now_s: float, *, busy: bool) -> Question | None:
         """What will be asked soon, as for :meth:`ask`; until then the team goes on."""
+        self._urgent = self._setbacks.due(now_s) or self._urgent
         due = self._replanning.due(now_s) or self._urgent
-        if now_s < self._rests_until_s < math.inf:
-            self._urgent = due
-            return None
-        self._rests_until_s = math.inf
         return self._question(now_s) if due and not busy else None
 
     def ask_now(self, now_s: float) -> Question | None:
@@ -186,6 +184,9 @@ class ReignDuty:
         return question
 
     def _question(self, now_s: float) -> Question | None:
+        if self._tree.collecting:  # nothing that is planned now could be proposed
+            self._urgent = True
+            return None
         if self._pending is not None or not self._is_complete(now_s):
             return None
         agent = self._agent.look(now_s)
@@ -224,7 +225,7 @@ class ReignDuty:
                 self._go(answer)
                 if not answer.failure:  # else what is under way may lead to a tree that was given up
                     self._dispatcher.permit(True)
-            elif not answer.failure and self._tree.may_propose(now_s, urgent=self._stands or not self._serves(now_s)):
+            elif not answer.failure and self._may_propose(answer.plan, now_s):
                 self._propose(answer, done.duration_s, now_s)
         self._heed(now_s)
 
@@ -251,6 +252,10 @@ class ReignDuty:
         base = self._mission.base_station
         return self._tree.serves({base.name: base.start, **places}, now_s)
 
+    def _may_propose(self, plan: Plan, now_s: float) -> bool:
+        urgent = self._stands or not self._serves(now_s)
+        return self._setbacks.may_try(plan.edges, now_s) and self._tree.may_propose(now_s, urgent=urgent)
+
     def _propose(self, answer: Answer, planning_s: float, now_s: float) -> None:
         """Have another tree negotiated, and keep everybody from going where it is needed until it is in force."""
         if not self._go(answer):
@@ -268,18 +273,16 @@ class ReignDuty:
         if self._tree.is_in_force(pending.plan.edges):
             self._decide(pending.plan, pending.planning_s)
             self._dispatcher.permit(True)
+            self._setbacks.forget(pending.plan.edges)
         elif pending.base_there and not self._base_there:
-            self._give_up("the base station is not there any more, and is not asked again", now_s)
+            self._effects += self._tree.withdraw("the base station is gone, and is not asked again", now_s)
+            self._urgent = True
         elif pending.revision != _revision(self._dispatcher.motion) or not self._tree.busy:
-            self._give_up("the motion to it has ended", now_s)
+            self._effects += self._tree.withdraw("the motion to it has ended", now_s)
+            self._setbacks.note(pending.plan.edges, now_s)
         else:
             return
         self._pending = None
-
-    def _give_up(self, why: str, now_s: float) -> None:
-        """Propose no more what is proposed, and plan afresh."""
-        self._effects += self._tree.withdraw(why, now_s)
-        self._urgent, self._rests_until_s = True, now_s + REST_S
 
     @property
     def _base_there(self) -> bool:
