@@ -116,31 +116,31 @@ def test_bodies_keep_to_free_space_and_to_their_speed(name: str, seed: int) -> N
     base, *others = map(tuple, places[free.contains(places)].tolist())
     near = [place for place in others if environment.line_of_sight(base, place)][:5]
     mission = team(Wandering(start_after_s=1.0), base, near[0], near[1:], seed)
-    trace = simulate(mission, environment, duration_s=40.0)
+    trace = simulate(mission, environment, duration_s=20.0)
     room = environment.inflated(0.2 - 2e-3, containing=base)
     assert not [line for _, _, line in trace.logs if line.level == "error"]
     for trail in trace.trails:
         limit_m_s = {"robot": 1.2, "tracked_agent": 0.8, "base_station": 0.0}[trail.role]
-        assert len(trail.times_s) == pytest.approx(400, abs=2)
+        assert len(trail.times_s) == pytest.approx(200, abs=2)
         if trail.role != "base_station":
             assert room.contains(trail.positions).all(), f"{trail.peer} on {name}, seed {seed}"
         steps_m = np.hypot(*np.diff(trail.positions, axis=0).T)
         assert (steps_m <= limit_m_s * np.diff(trail.times_s) + 1e-6).all()
     metrics = measure(trace, environment)
-    assert metrics.agent_distance_m > 10.0
-    assert metrics.total_distance_m > 5.0
+    assert metrics.agent_distance_m > 5.0
+    assert metrics.total_distance_m > 2.0
 
 
 def test_equal_seeds_give_equal_traces_to_the_last_bit() -> None:
     mission = around_the_corner(Wandering(start_after_s=0.5))
-    traces = [simulate(mission, CORNER, duration_s=20.0, seed=seed) for seed in (5, 5, 6)]
+    traces = [simulate(mission, CORNER, duration_s=10.0, seed=seed) for seed in (5, 5, 6)]
     assert digest(traces[0]) == digest(traces[1]) != digest(traces[2])
 
 
 def test_the_seed_decides_and_not_the_hashes_of_python() -> None:
     program = (
         "from tests.launcher.test_simulation import *\n"
-        "print(digest(simulate(around_the_corner(Wandering(start_after_s=0.5)), CORNER, duration_s=10.0)))"
+        "print(digest(simulate(around_the_corner(Wandering(start_after_s=0.5)), CORNER, duration_s=6.0)))"
     )
     digests = set()
     for hash_seed in ("1", "2"):
