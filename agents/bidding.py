@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +26,9 @@ from agents.proposals import (
     team_order,
     team_tree,
 )
+from agents.whereabouts import Aim
 from planning.own_edges import exchange_own, own_edges
-from protocol.messages import Offer
+from protocol.messages import Offer, Point
 from protocol.topology import in_words
 
 Floats = NDArray[np.float64]
@@ -78,6 +80,8 @@ class Bidder(Proposer):
     def award(self, bids: Bids, robots: Collection[str]) -> list[Proposal]:
         """The best that was offered for each aim; those that need no relay are nobody's to offer.
 
+        An offer counts only if its relays would stand at placements of one's own, and see what it says that they see.
+
         Args:
             bids: of an auction.
             robots: that can still be counted on.
@@ -89,7 +93,9 @@ class Bidder(Proposer):
                 (offer, name)
                 for name, those in bids.offers.items()
                 for offer in those
-                if offer.aim == number and all(relay.robot in robots for relay in offer.relays)
+                if offer.aim == number
+                and all(relay.robot in robots for relay in offer.relays)
+                and self._holds(offer, aim)
             ]
             if direct is not None:
                 won.append(direct)
@@ -102,6 +108,23 @@ class Bidder(Proposer):
                 reason = f"{relays_in_words(len(offer.relays))} {purpose}; {how}"
                 won.append(Proposal(offer.relays, True, reason, offer.cost, offer.total_cost_m))
         return won
+
+    def _holds(self, offer: Offer, aim: Aim) -> bool:
+        """Whether the chain that is offered is one: from link to link in sight, and of the aim what is claimed."""
+        if not offer.relays:
+            return False
+        places = [self._places.get(relay.position) for relay in offer.relays]
+        stops = [place for place in places if place is not None]
+        if len(stops) < len(places) or self._crowded(stops):
+            return False
+        links = [self._from_base[stops[0]], *(self._links[hop] for hop in pairwise(stops))]
+        sees = self._graph.sees_all(aim.places) if offer.whole else self._view(aim)[1] > 0.0
+        return bool(np.isfinite(links).all() and sees[stops[-1]])
+
+    @cached_property
+    def _places(self) -> dict[Point, int]:
+        """The placements by where they are: numbers are the same on the wire to the last bit."""
+        return {(x, y): place for place, (x, y) in enumerate(self._graph.positions.tolist())}
 
     def _find_near(self, move: Floats, to_agent: Floats, tree: Ints, own: Collection[tuple[int, int]]) -> Found | None:
         """The chain of the trees in which one of some edges is another."""

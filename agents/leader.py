@@ -16,7 +16,7 @@ by the robot that is there already. Around an agent that is only measured some o
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final, Literal, TypeAlias
 
@@ -196,7 +196,8 @@ class DeploymentPlanner:
 
     def bid(self, lot: Lot, bidder: str) -> tuple[Offer, ...]:
         """What a member of the team offers in an auction (:meth:`agents.bidding.Bidder.offers`)."""
-        return self._proposer.offers(lot, self._base_name, self._agent_name, bidder)
+        robots = {name: self._inside(place) for name, place in lot.robots.items()}
+        return self._proposer.offers(replace(lot, robots=robots), self._base_name, self._agent_name, bidder)
 
     def _unreachable(self, point: Point) -> str:
         """Why no chain leads there; a sentence."""

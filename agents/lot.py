@@ -63,11 +63,14 @@ def from_auction(auction: Auction) -> Lot:
     """The lot of a message.
 
     Raises:
-        ValueError: an aim has more places than shares or fewer, or the chain has a relay of which no place is said.
+        ValueError: an aim has more places than shares or fewer, or shares that are none, or the chain has a relay of
+            which no place is said, or one twice.
     """
     robots = {placement.robot: placement.position for placement in auction.robots}
     if unknown := [name for name in auction.standing if name not in robots]:
         raise ValueError(f"{unknown[0]} is a relay of the chain, and its place is not said")
+    if len(set(auction.standing)) < len(auction.standing):
+        raise ValueError("a robot is twice a relay of the chain")
     aims = []
     for aim in auction.aims:
         if len(aim.places) != len(aim.shares):

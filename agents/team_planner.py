@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
@@ -16,7 +17,7 @@ from agents.lot import Lot
 from agents.motion_planner import Option
 from agents.planning_job import Answer, Question
 from agents.roaming import Roaming
-from agents.whereabouts import Whereabouts, announce
+from agents.whereabouts import Whereabouts, announce, name_place
 from planning.foresight import tail
 from planning.reach_in_sight import time_in_sight
 from protocol.messages import Offer, Point
@@ -55,9 +56,23 @@ class TeamPlanner:
     ) -> None:
         self._environment, self._deployments, self._motions = environment, deployments, motions
         self._agent_speed_m_s, self._roaming = agent_speed_m_s, roaming
+        self._radius_m = deployments.graph.radius_m
 
     def plan(self, question: Question) -> Answer:
-        """Who is to stand where, for the agent as it will be when the robots can begin to go there, and how."""
+        """Who is to stand where, for the agent as it will be when the robots can begin to go there, and how.
+
+        Robots that say that they are where no robot can be are left out, and the answer says so.
+        """
+        question, nowhere = self._set_right(question)
+        answer = self._answer(question)
+        if not nowhere:
+            return answer
+        if answer.course is None:
+            return replace(answer, plan=replace(answer.plan, reason=f"{answer.plan.reason}; {nowhere}"))
+        reasons = [reason for reason in (answer.course.reason, nowhere) if reason]
+        return replace(answer, course=replace(answer.course, reason="; ".join(reasons)))
+
+    def _answer(self, question: Question) -> Answer:
         onset = question.onset
         agent = self._expect(question)
         robots = {name: place for name, place in onset.places.items() if name != self._motions.base}
@@ -79,6 +94,7 @@ class TeamPlanner:
 
     def lot(self, question: Question) -> Lot:
         """What to auction before the question is answered."""
+        question, _ = self._set_right(question)
         robots = {name: place for name, place in question.onset.places.items() if name != self._motions.base}
         obstacles = [place for lost in question.lost.values() for place in _points(lost)]
         return self._deployments.lot(self._expect(question), robots, question.previous, obstacles)
@@ -86,6 +102,34 @@ class TeamPlanner:
     def bid(self, lot: Lot, bidder: str) -> tuple[Offer, ...]:
         """What a member of the team offers in an auction."""
         return self._deployments.bid(lot, bidder)
+
+    def _set_right(self, question: Question) -> tuple[Question, str]:
+        """The question with everybody where a robot can be, and who is left out, in words; empty: nobody."""
+        places: dict[str, Point] = {}
+        nowhere = []
+        for name, place in question.onset.places.items():
+            inside = place if name == self._motions.base else self._nearest(place)
+            if inside is None:
+                nowhere.append(f"{name} says that it is at {name_place(place)}, where no robot can be, and is left out")
+            else:
+                places[name] = inside
+        lost = {}
+        for name, where in question.lost.items():
+            inside_too = [place for place in map(self._nearest, _points(where)) if place is not None]
+            if inside_too:
+                lost[name] = np.array(inside_too)
+        previous = question.previous
+        if previous is not None:  # of a leader before, who may have said anything
+            kept = tuple(place for place in previous.placements if self._nearest(place.position) == place.position)
+            gone = [place for place in previous.placements if place not in kept]
+            previous = None if any(not place.spare for place in gone) else replace(previous, placements=kept)
+        onset = replace(question.onset, places=places)
+        return replace(question, onset=onset, lost=lost, previous=previous), "; ".join(nowhere)
+
+    def _nearest(self, place: Point) -> Point | None:
+        """Where a robot is that says that it is there; None if no robot can be so near to it as its radius."""
+        x, y = self._motions.geodesics.nearest(place).tolist()
+        return (x, y) if math.dist((x, y), place) <= self._radius_m else None
 
     def _time_in_sight(self, watcher: Point, question: Question) -> float:
         """From the onset on; the agent may have gone anywhere until then."""

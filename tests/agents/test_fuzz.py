@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from functools import cache
 
 import pytest
@@ -14,12 +15,12 @@ from protocol.keys import Address
 from protocol.messages import BODIES
 from protocol.schemas import example_payloads
 from tests.campaigns.arbitrary_messages import BAD_KEYS
-from tests.campaigns.fuzz import NAMES, Life, fuzz, make_casting
+from tests.campaigns.fuzz import NAMES, Life, fuzz, make_castings
 
 
 @cache
-def casting() -> Casting:
-    return make_casting()
+def castings() -> tuple[Casting, ...]:
+    return make_castings()
 
 
 @st.composite
@@ -39,11 +40,12 @@ def payloads(draw: st.DrawFn) -> bytes:
     return draw(st.binary(max_size=200) | st.just(example[:begin] + noise + example[end:]))
 
 
+@pytest.mark.parametrize("team", range(2))
 @pytest.mark.parametrize("name", NAMES[:3])
 @given(st.lists(st.tuples(keys(), payloads()), max_size=20))
-@settings(max_examples=25, deadline=None)
-def test_noise_is_counted_and_survived(name: str, said: list[tuple[str, bytes]]) -> None:
-    life = Life(casting(), name)
+@settings(max_examples=15, deadline=None)
+def test_noise_is_counted_and_survived(name: str, team: int, said: list[tuple[str, bytes]]) -> None:
+    life = Life(castings()[team], name)
     for key, payload in said:
         life.give(Received(key, payload))
     assert life.shell.traceback == ""
@@ -51,8 +53,11 @@ def test_noise_is_counted_and_survived(name: str, said: list[tuple[str, bytes]])
 
 
 def test_messages_that_make_no_sense_are_survived() -> None:
-    """A short piece of the campaign: one life of each kind of peer."""
-    assert fuzz(1500, 11, casting(), life=500) == []
+    """A short piece of the campaign: a life of each kind of peer in each kind of team, and no kind is left out."""
+    heard: Counter[str] = Counter()
+    assert fuzz(3000, 12, castings(), life=500, heard=heard) == []
+    assert BODIES.keys() - heard.keys() == {"goal_reply"}, "which is for operators"
+    assert frozenset().union(*(one.cast(name)[0].hears for one in castings() for name in NAMES)) == heard.keys()
 
 
 def test_the_campaign_finds_a_peer_that_fails(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -66,6 +71,6 @@ def test_the_campaign_finds_a_peer_that_fails(monkeypatch: pytest.MonkeyPatch) -
         return handle(self, event, now_s)  # type: ignore[arg-type]
 
     monkeypatch.setattr(Allegiance, "handle", fail_at_times)
-    complaints = fuzz(2000, 0, casting(), names=("robot1",), life=500)
+    complaints = fuzz(2000, 0, castings(), names=("robot1",), life=500)
     assert complaints
     assert "planted" in complaints[0]

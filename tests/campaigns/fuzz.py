@@ -15,19 +15,19 @@ import resource
 import sys
 import time
 import traceback
-from collections import Counter
-from collections.abc import Iterable
+from collections import Counter, deque
+from collections.abc import Iterable, Sequence
 from typing import Final, Literal
 
 from agents.casting import Casting
 from agents.mission import Mission, OnDemand, RosterEntry
 from agents.records import AnyRecord, LogLine, Office
-from agents.role import Compute, JobDone, Persist, Written
+from agents.role import Compute, Effect, Event, Heard, JobDone, Persist, Written
 from agents.shell import MAXIMUM_OPERATORS, PeerShell
 from planning.environment import Environment
 from protocol.bus import BusEvent, Received
 from protocol.keys import Address
-from protocol.messages import decode
+from protocol.messages import Method, Point, decode, kind_of
 from tests.campaigns.arbitrary_messages import Mischief
 
 NAMES: Final = ("base", "agent", "robot1", "robot2")
@@ -35,15 +35,17 @@ LIFE: Final = 4000
 """Inputs that one peer gets."""
 STEP_S: Final = 0.01
 """Mission time between two inputs."""
-PLANS_EVERY: Final = 1000
-"""Of so many inputs one lets a planning job run; the other jobs never end, as if the machine were busy."""
+JOBS_EVERY: Final = 200
+"""After so many inputs one of the jobs that wait is done, whichever it is."""
+MOST_JOBS: Final = 8
+"""If more wait, the oldest never end, as if the machine were busy."""
 MOST_LINES: Final = 1500
 """Log lines of a life; noise of one kind is logged once, but a peer may well say whom it obeys, again and again."""
 
 ROOMS = Environment([(0, 0), (8, 0), (8, 3), (9, 3), (9, 0), (17, 0), (17, 6), (0, 6)], name="two rooms")
 
 
-def make_mission() -> Mission:
+def make_mission(*, announces: bool = True, topology: Method = "optimum") -> Mission:
     """A small team in two rooms."""
     starts = ((1.0, 1.0), (3.0, 3.0), (2.0, 1.0), (1.0, 2.0))
     roles = ("base_station", "tracked_agent", "robot", "robot")
@@ -66,6 +68,8 @@ def make_mission() -> Mission:
         duration_s=None,
         seed=0,
         epoch_unix_s=0.0,
+        announces=announces,
+        topology=topology,
     )
 
 
@@ -89,16 +93,31 @@ class Life:
         self.lines = self.published = self.given = 0
         self.led = False
         """Whether it was ever elected."""
-        self._jobs: list[Compute] = []
+        self.heard: Counter[str] = Counter()
+        """Kinds of messages that its mind was given, and how many."""
+        self.done: Counter[str] = Counter()
+        """Names of jobs that were done beside it, and how many."""
+        self._jobs: deque[Compute] = deque(maxlen=MOST_JOBS)
         self._promises: list[Persist] = []
         role, driver = casting.cast(name)
+        self._role, self.hears = role, role.hears
         self.mischief = Mischief(seed, "team", NAMES, name, role.hears)
         self.shell = Witnessed(
-            role, driver, self, name=name, team="team", incarnation=0, peers=NAMES, now=lambda: self.now_s,
+            self, driver, self, name=name, team="team", incarnation=0, peers=NAMES, now=lambda: self.now_s,
             wall_clock=lambda: self.now_s, record=self._record, execute=self._jobs.append,
             persist=self._promises.append,
         )  # fmt: skip
         self.shell.start()
+
+    def start(self, now_s: float, position: Point) -> Iterable[Effect]:
+        """Of the role."""
+        return self._role.start(now_s, position)
+
+    def handle(self, event: Event, now_s: float) -> Iterable[Effect]:
+        """Of the role: counts what is heard."""
+        if isinstance(event, Heard):
+            self.heard[kind_of(event.envelope.body)] += 1
+        return self._role.handle(event, now_s)
 
     def publish(self, key: str, payload: bytes) -> None:
         """Of the bus: what the peer says is well-formed, whatever it was told."""
@@ -116,9 +135,10 @@ class Life:
         self.shell.take(event)
         while self._promises:
             self.shell.written(Written(self._promises.pop(0).token, "disk full" if self.given % 97 == 0 else ""))
-        if self.given % PLANS_EVERY == 0 and self._jobs:
-            job = self._jobs[-1]
-            self._jobs.clear()
+        if self.given % JOBS_EVERY == 0 and self._jobs:
+            job = self.mischief.chance.choice(self._jobs)
+            self._jobs.remove(job)
+            self.done[job.job] += 1
             try:
                 result, failure = job.function(*job.arguments), ""
             except Exception as problem:
@@ -149,23 +169,44 @@ class Life:
         self.led |= isinstance(record, Office) and record.leads is not None
 
 
-def make_casting() -> Casting:
-    """Who makes peers; the planner is compiled once."""
-    casting = Casting(make_mission(), ROOMS)
-    casting.team_planner()
-    return casting
+def make_castings() -> tuple[Casting, ...]:
+    """Who makes the peers of both kinds of teams; the planners are compiled once.
+
+    One agent announces its way, and its leader looks for trees alone; the other is measured, and trees are auctioned.
+    """
+    missions = make_mission(), make_mission(announces=False, topology="auction")
+    castings = tuple(Casting(mission, ROOMS) for mission in missions)
+    for casting in castings:
+        casting.team_planner()
+    return castings
 
 
 def fuzz(
-    inputs: int, first_seed: int, casting: Casting, names: Iterable[str] = NAMES[:3], life: int = LIFE
+    inputs: int,
+    first_seed: int,
+    castings: Sequence[Casting],
+    names: Iterable[str] = NAMES[:3],
+    life: int = LIFE,
+    heard: Counter[str] | None = None,
 ) -> list[str]:
-    """Give so many inputs to one peer after the other, ``life`` to each; what went wrong."""
+    """Give so many inputs to one peer after the other, of one team and the other; what went wrong.
+
+    Args:
+        inputs: in all.
+        first_seed: of the first peer; the next has the next.
+        castings: make the peers.
+        names: of the peers, in turn.
+        life: inputs to each.
+        heard: is told which kinds of messages minds were given.
+    """
     complaints: list[str] = []
     refused: Counter[str] = Counter()
+    heard = Counter() if heard is None else heard
+    done: Counter[str] = Counter()
     given, led, seed, shown = 0, 0, first_seed, time.monotonic()
-    order = tuple(names)
+    order = tuple((casting, name) for casting in castings for name in names)
     while given < inputs:
-        name = order[seed % len(order)]
+        casting, name = order[seed % len(order)]
         peer = Life(casting, name, seed)
         for _ in range(min(life, inputs - given)):
             peer.give(peer.mischief.event())
@@ -176,6 +217,8 @@ def fuzz(
         if complaint := peer.complaint():
             complaints.append(f"seed {seed}, {name}, input {peer.given}: {complaint}")
         refused += peer.shell.refused
+        heard += peer.heard
+        done += peer.done
         seed += 1
         if time.monotonic() - shown > 5.0:
             shown = time.monotonic()
@@ -183,6 +226,8 @@ def fuzz(
     reasons = ", ".join(f"{count:,} {reason}" for reason, count in refused.most_common())
     peers = f"{seed - first_seed} peers in turn, of which {led} were made to lead"
     print(f"{given:,} inputs to {peers}; refused: {reasons}; {len(complaints)} complaints")
+    for what, counts in (("heard", heard), ("done", done)):
+        print(f"{what}: " + ", ".join(f"{count:,} {name}" for name, count in counts.most_common()))
     return complaints
 
 
@@ -197,11 +242,12 @@ def main() -> int:
     parser.add_argument("--inputs", type=int, default=1_000_000)
     parser.add_argument("--seed", type=int, default=0, help="of the first peer")
     options = parser.parse_args()
-    casting = make_casting()
+    castings = make_castings()
     begun = time.perf_counter()
-    fuzz(options.inputs // 10, options.seed + 1_000_000, casting)  # what is loaded and cached on first use is there now
+    # What is loaded and cached on first use is there after a tenth.
+    fuzz(options.inputs // 10, options.seed + 1_000_000, castings)
     before_mb = resident_mb()
-    complaints = fuzz(options.inputs, options.seed, casting)
+    complaints = fuzz(options.inputs, options.seed, castings)
     grown_mb = resident_mb() - before_mb
     if grown_mb > 50.0:
         complaints.append(f"{grown_mb:.0f} MB more after {options.inputs:,} inputs")

@@ -21,7 +21,7 @@ with atheris.instrument_imports(include=["agents", "protocol"]):
     from protocol.keys import Address
     from protocol.messages import BODIES, decode
     from protocol.schemas import example_payloads
-    from tests.campaigns.fuzz import LIFE, NAMES, Life, make_casting
+    from tests.campaigns.fuzz import LIFE, NAMES, Life, make_castings
 
 KINDS = list(BODIES)
 
@@ -32,8 +32,8 @@ def main() -> None:
     parser.add_argument("--inputs", type=int, default=1_000_000)
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
-    casting = make_casting()
-    lives = [Life(casting, name) for name in NAMES[:3]]
+    peers = [(casting, name) for casting in make_castings() for name in NAMES[:3]]
+    lives = [Life(casting, name) for casting, name in peers]
     given = 0
 
     def give(data: bytes) -> None:
@@ -41,12 +41,12 @@ def main() -> None:
         peer = given % len(lives)
         given += 1
         if lives[peer].given >= LIFE:
-            lives[peer] = Life(casting, NAMES[peer], given)
+            lives[peer] = Life(*peers[peer], given)
         kind = KINDS[data[0] % len(KINDS)] if data else KINDS[0]
         speaker = NAMES[data[1] % len(NAMES)] if len(data) > 1 else NAMES[0]
         lives[peer].give(Received(Address("team", speaker, kind, operator=kind == "goal").key, data[2:]))
         if lives[peer].shell.traceback:
-            raise AssertionError(f"{NAMES[peer]} failed:\n{lives[peer].shell.traceback}")
+            raise AssertionError(f"{peers[peer][1]} failed:\n{lives[peer].shell.traceback}")
 
     with TemporaryDirectory() as corpus:
         for kind, payload in example_payloads().items():
