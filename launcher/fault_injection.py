@@ -111,6 +111,8 @@ class FaultInjection:
             case Kill(who=who):
                 if not self._on(Kill, who):
                     self._peers[who].start()
+                    if self._on(Pause, who):
+                        self._peers[who].pause()
             case Pause(who=who):
                 if not self._on(Pause, who):
                     self._peers[who].resume()

@@ -6,11 +6,15 @@ from collections import deque
 from collections.abc import Mapping, Set
 from typing import Any, Final
 
+from agents.casting import Casting
+from agents.mission import Mission
+from protocol.roster import Roster
+
 OURS: Final = ("agents.", "protocol.", "estimation.")
 """Objects of these packages are looked into; maps, arrays and the rest of the world are not the mind's."""
 
-SHARED: Final = ("Mission", "Roster", "Casting", "LightCasting", "_Planner", "TeamPlanner")
-"""Types of what all peers of a simulation have in common."""
+SHARED: Final = (Mission, Roster, Casting)
+"""What all peers of a simulation have in common; of planners a mind keeps but a way to ask for them."""
 
 
 def count_kept(root: object) -> int:
@@ -34,7 +38,7 @@ def _inside(thing: Any) -> list[Any]:
     if isinstance(thing, Set | list | tuple | deque):
         return list(thing)
     kind = type(thing)
-    if not kind.__module__.startswith(OURS) or kind.__name__ in SHARED:
+    if not kind.__module__.startswith(OURS) or isinstance(thing, SHARED):
         return []
     if hasattr(kind, "__struct_fields__"):
         return [getattr(thing, field) for field in kind.__struct_fields__]
