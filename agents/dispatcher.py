@@ -75,6 +75,8 @@ class Dispatcher:
         self._held: Authority | None = None
         """The first order to hold since the last plan ended."""
         self._held_s = 0.0
+        self._heard_s: dict[str, float] = {}
+        """Since when each robot that speaks has been heard without a break."""
         self._ordered: Authority | None = None
         """The first order of the present revision."""
         self._ordered_s = 0.0
@@ -131,6 +133,7 @@ class Dispatcher:
         before = self._states.get(robot)
         self._states[robot] = state
         if before is None:
+            self._heard_s[robot] = now_s
             del self._lost[robot]
             self._adrift.discard(robot)
             self._begin_afresh("")
@@ -151,11 +154,18 @@ class Dispatcher:
         self._begin_afresh("")
 
     def deaf(self, now_s: float) -> tuple[str, ...]:
-        """Robots that speak, and have not said for :data:`PATIENCE_S` that they have heard the order to hold."""
+        """Robots that have spoken for :data:`PATIENCE_S`, and have not said that they have heard the order to hold.
+
+        That order has stood for as long: who is heard first while it does has as much time to answer as all others.
+        """
         held = self._held
-        if self._authority is not None or held is None or now_s - self._held_s <= PATIENCE_S:
+        if self._authority is not None or held is None:
             return ()
-        return tuple(robot for robot, state in self._states.items() if not has_heard(state, held))
+        return tuple(
+            robot
+            for robot, state in self._states.items()
+            if now_s - max(self._held_s, self._heard_s[robot]) > PATIENCE_S and not has_heard(state, held)
+        )
 
     def permit(self, permitted: bool) -> None:
         """Say whether more of the motion may be released: not before the tree that it leads to is in force."""

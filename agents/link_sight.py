@@ -5,7 +5,8 @@ A link of the team's tree is to hold from a stage on. Whether it does is judged 
 while nobody begins a stage before the others have finished the last but one.
 
 Of the agent no motion is certified. It is linked with a relay if that sees some place where the agent may be, from
-wherever a stage of the relay's way begins or ends.
+wherever a stage of the relay's way begins or ends. While it may be anywhere that holds of every relay: of
+no place is it known that it is not there.
 """
 
 from __future__ import annotations
@@ -41,8 +42,8 @@ class Scene:
     places: Mapping[str, Point]
     """Where everybody is that is not in the motion."""
     agent: str
-    may_be: Sequence[Point] = field(default=())
-    """Where the agent may be, now or on its way."""
+    may_be: Sequence[Point] | None = field(default=())
+    """Where the agent may be, now or on its way; None: anywhere. Empty: it has yet to say so."""
 
 
 def places_on(way: Sequence[Point]) -> tuple[Point, ...]:
@@ -139,6 +140,6 @@ def _first_stage_with_agent(scene: Scene, motion: Motion, relay: MemberWay) -> i
 
 
 def _sees_some(scene: Scene, place: Point) -> bool:
-    if not scene.may_be:
-        return False
-    return bool(np.any(scene.environment.line_of_sight(np.array(place), np.array(scene.may_be))))
+    if scene.may_be is None:
+        return True
+    return bool(scene.may_be) and bool(np.any(scene.environment.line_of_sight(np.array(place), np.array(scene.may_be))))

@@ -175,9 +175,13 @@ class SharedEstimate:
         )
 
     def _receive(self, said: Ranges, now_s: float) -> None:
-        known = self._ranges.log.heard
-        fit = [record for said_one in said.ranges if (record := self._vetting.range(said_one, now_s)) is not None]
-        fit = [record for record in fit if record.peer in known or len(known) < MOST_SOURCES]
+        known = set(self._ranges.log.heard)
+        fit = []
+        for said_one in said.ranges:
+            record = self._vetting.range(said_one, now_s)
+            if record is not None and (record.peer in known or len(known) < MOST_SOURCES):
+                known.add(record.peer)
+                fit.append(record)
         self._refused += len(said.ranges) - len(fit)
         self._debts.settle((record.peer, record.number) for record in fit)
         if self._ranges.receive(fit, now_s):
@@ -200,7 +204,7 @@ class SharedEstimate:
 
     def _adopt(self, said: RangeBase, now_s: float) -> None:
         base = self._vetting.base(said, now_s)
-        if base is None:
+        if base is None or len(self._ranges.log.heard.keys() | base.heard.keys()) > MOST_SOURCES:
             self._refused += 1
             return
         self._debts.settle([BASE])

@@ -67,11 +67,11 @@ class Surroundings:
         places |= {name: state.position for name, state in states.items() if state is not None}
         return Scene(self.environment, motion, places, self.agent, self.may_be(now_s))
 
-    def may_be(self, now_s: float) -> Sequence[Point]:
-        """Where the agent may be, now or on its way; empty: that is not known."""
+    def may_be(self, now_s: float) -> Sequence[Point] | None:
+        """Where the agent may be, now or on its way; None: anywhere. Empty: it has yet to say so."""
         if self._estimate is not None:
             target = self._estimate.target(now_s)
-            return () if target is None else target.samples
+            return None if target is None else target.samples
         intent = self._others.intent()
         return () if intent is None else places_on(intent.path or (intent.position,))
 
@@ -82,7 +82,7 @@ class Surroundings:
             return self.scene(None, now_s), ()
         scene = self.scene(orders.motion, now_s)
         ready = (link for link in links if self._is_accepted(link, orders.authority.epoch, orders.motion))
-        return scene, tuple(link for link in ready if scene.may_be or self.agent not in link.ends)
+        return scene, tuple(link for link in ready if scene.may_be != () or self.agent not in link.ends)
 
     def _is_accepted(self, link: NewLink, epoch: int, motion: Motion | None) -> bool:
         """Whether this peer goes by the motion that a link is about."""

@@ -35,6 +35,7 @@ from protocol.messages import (
     Method,
     Milestone,
     Motion,
+    NewLink,
     Point,
     Reign,
     Topology,
@@ -43,6 +44,7 @@ from protocol.messages import (
 from protocol.negotiation import Deposed, Elected, Negotiation, Propose, Settled, Withdraw, Word
 from protocol.negotiation import Event as NegotiationEvent
 from protocol.topology import in_words
+from protocol.topology_states import Phase
 
 JUDGING: Final = "judging links"
 FORESEEING: Final = "foreseeing links"
@@ -100,8 +102,8 @@ class TeamTree:
         self._said = 0
         """Words in this reign."""
         self._wish: _Wish | None = None
-        self._judging: TreeNumber | None = None
-        """The proposal whose links a job is about."""
+        self._judging: tuple[TreeNumber, tuple[NewLink, ...]] | None = None
+        """What a job is about: a proposal, and links of it."""
         self._epoch = -1
         """Of the last word heard."""
         self._answer: Confirmation | None = None
@@ -109,8 +111,9 @@ class TeamTree:
         self._answer_at_s = -math.inf
         self._tick_s = math.inf
         self._news = False
-        """Whether a proposal has been settled since this peer was woken."""
-        self._complaint = ""
+        """Whether a proposal has been settled, or can be made now, since this peer was woken."""
+        self._complaints: dict[str, str] = {}
+        """What was wrong last, by what it was about; said once, however often it happens."""
         self._effects: list[Effect] = []
 
     @property
@@ -119,9 +122,9 @@ class TeamTree:
         return AT_ONCE_S if self._news else min(self._answer_at_s, self._tick_s)
 
     @property
-    def links(self) -> tuple[Edge, ...]:
-        """Links of the tree that this peer keeps."""
-        return self.held.links
+    def collecting(self) -> bool:
+        """Whether this leader has yet to learn what was in force before it; until then nothing can be proposed."""
+        return self._negotiation.phase is Phase.COLLECTING
 
     @property
     def busy(self) -> bool:
@@ -217,7 +220,10 @@ class TeamTree:
             self._negotiate(Elected(reign.epoch, present), now_s)
 
     def _negotiate(self, event: NegotiationEvent, now_s: float) -> None:
-        for effect in self._negotiation.handle(event, now_s):
+        collecting = self.collecting
+        effects = self._negotiation.handle(event, now_s)
+        self._news = self._news or (collecting and not self.collecting)
+        for effect in effects:
             match effect:
                 case Word():
                     self._say(effect, now_s)
@@ -243,9 +249,7 @@ class TeamTree:
         if self._allegiance.take("topology", word.authority, sender, incarnation, word.warrant, now_s):
             return
         fault = self.held.take(word)
-        if fault and fault != self._complaint:
-            self._log("warning", f"does not take the word of {sender}: {fault}")
-        self._complaint = fault
+        self._complain("warning", f"does not take the word of {sender}: ", fault)
         if word.proposal is not None or word.authority.epoch != self._epoch:
             self._answer_at_s = AT_ONCE_S
         self._epoch = word.authority.epoch
@@ -258,16 +262,21 @@ class TeamTree:
         scene, ready = self._surroundings.ready_to_judge(links, now_s)
         if ready:
             assert self.held.proposal is not None
-            self._judging = self.held.proposal.tree.number
+            self._judging = self.held.proposal.tree.number, ready
             self._effects.append(Compute(JUDGING, judge_links, (scene, self._name, ready)))
 
     def _judged(self, done: JobDone) -> None:
-        number, self._judging = self._judging, None
-        if done.failure:
-            self._log("error", f"links could not be judged: {done.failure}")
-        elif number is not None:
-            views: tuple[LinkView, ...] = done.result
-            self.held.judge(number, views)
+        judging, self._judging = self._judging, None
+        if judging is None:
+            return
+        number, links = judging
+        self._complain("error", "links could not be judged: ", done.failure)
+        views: tuple[LinkView, ...] = () if done.failure else done.result
+        if done.failure:  # what cannot be judged is not confirmed, and not judged again
+            why = f"{self._name} could not judge it: {done.failure}"[:500]
+            others = (next((end for end in link.ends if end != self._name), self._name) for link in links)
+            views = tuple(LinkView(peer=other, verdict="refuses", reason=why) for other in others)
+        self.held.judge(number, views)
 
     def _foreseen(self, done: JobDone, now_s: float) -> None:
         """Propose what was wished, now that it is known from which stage on its links hold."""
@@ -277,9 +286,10 @@ class TeamTree:
         self._news = True
         stages: Sequence[int | None] = [None] * len(wish.edges) if done.failure else done.result
         blind = [edge for edge, stage in zip(wish.edges, stages, strict=True) if stage is None]
-        if blind:
-            why = done.failure or "their ends do not see each other where they come to a stop"
-            self._log("warning", f"does not propose the links {in_words(blind)}: {why}")
+        why = done.failure or "their ends do not see each other where they come to a stop"
+        fault = f"{in_words(blind)}: {why}" if blind else ""
+        self._complain("warning", "does not propose the links ", fault)
+        if fault:
             return
         motion, epoch = wish.motion, self._reign.epoch
         since = {
@@ -321,6 +331,12 @@ class TeamTree:
         self._effects.append(Publish(answer))
         if self._allegiance.leads(now_s):
             self._negotiate(core.Heard(self._name, self._allegiance.incarnation, answer), now_s)
+
+    def _complain(self, level: Literal["warning", "error"], what: str, why: str) -> None:
+        """Log what is wrong; the same only once, however often it happens."""
+        if why and why != self._complaints.get(what):
+            self._log(level, f"{what}{why}")
+        self._complaints[what] = why
 
     def _log(self, level: Literal["info", "warning", "error"], text: str) -> None:
         self._effects.append(Record(LogLine(level=level, text=text)))

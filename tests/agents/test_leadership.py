@@ -63,7 +63,7 @@ def plan(relay: Point = (2.0, 2.0), spare: Point = (3.0, 3.0), edges: Any = CHAI
 class Agreed:
     """A tree that everybody has agreed to, whatever it is."""
 
-    busy = False
+    busy = collecting = False
 
     def is_in_force(self, _edges: object) -> bool:
         return True

@@ -170,11 +170,12 @@ def test_a_tree_is_in_force_when_the_robot_has_accepted_the_motion_to_it_and_not
     team.carry_out("base", team.leader.propose(FAR, TO_THE_CORNER, "optimum", "it is far", 0.2), 0.2)
     team.order(TO_THE_CORNER, 0.25)
     team.pass_time(0.3, 1.3)
-    assert team.leader.busy and not team.leader.is_in_force(FAR) and not team.parts["robot1"].links
+    assert team.leader.busy and not team.leader.is_in_force(FAR)
+    assert team.parts["robot1"].held.committed is None
     team.body.accept(TO_THE_CORNER)
     team.pass_time(1.3, 1.4)
     assert team.leader.is_in_force(FAR) and not team.leader.busy
-    assert team.parts["robot1"].links == team.leader.links == FAR
+    assert team.parts["robot1"].held.links == team.leader.held.links == FAR
     (change,) = team.changes
     assert change.committed and change.number == (EPOCH, 0) and change.new == FAR and change.released == ()
     assert change.reason == "it is far" and change.rounds > 3
@@ -190,7 +191,7 @@ def test_the_next_tree_asks_about_new_links_only_and_keeps_the_old_ones_until_it
     assert not team.leader.may_propose(0.4, urgent=False) and team.leader.may_propose(0.4, urgent=True)
     team.carry_out("base", team.leader.propose(FAR, TO_THE_CORNER, "auction", "it goes", 0.4), 0.4)
     team.order(TO_THE_CORNER, 0.4)
-    assert team.parts["robot1"].links == NEAR
+    assert team.parts["robot1"].held.links == NEAR
     team.body.accept(TO_THE_CORNER)
     team.pass_time(0.4, 0.6)
     first, second = team.changes
@@ -207,7 +208,7 @@ def test_who_is_not_heard_is_named_when_a_proposal_is_given_up() -> None:
     team.pass_time(0.2, 0.2 + ROUNDS * ROUND_S + 0.1)
     (change,) = team.changes
     assert not change.committed and change.reason == f"no answer in {ROUNDS} rounds from robot1"
-    assert not team.leader.busy and team.leader.links == ()
+    assert not team.leader.busy and team.leader.held.links == ()
 
 
 def test_links_whose_ends_will_not_see_each_other_are_not_even_proposed() -> None:
@@ -237,9 +238,9 @@ def test_words_that_are_not_in_force_are_not_heard() -> None:
     team.order(None, 0.2)
     team.pass_time(0.2, 0.3)
     robot, late = team.parts["robot1"], team.words[0]
-    assert late.committed is None and robot.links == NEAR
+    assert late.committed is None and robot.held.links == NEAR
     robot.handle(heard("base", late), 0.4)
-    assert robot.links == NEAR and robot.held.proposal is None
+    assert robot.held.links == NEAR and robot.held.proposal is None
 
 
 def test_a_tree_that_is_none_is_not_taken_and_that_is_said_once() -> None:
@@ -249,7 +250,7 @@ def test_a_tree_that_is_none_is_not_taken_and_that_is_said_once() -> None:
         authority = Authority(epoch=EPOCH, leader="base", sequence=sequence)
         fault = structs.replace(NO_TREE, authority=authority)
         team.carry_out("robot1", robot.handle(heard("base", fault), 0.4), 0.4)
-    assert robot.links == ()
+    assert robot.held.links == ()
     assert [text for text in team.logs if "does not take" in text] == [
         "does not take the word of base: tree 1 of epoch 3 is none: agent is not joined to base"
     ]
