@@ -20,12 +20,14 @@ from protocol.election import Effect as ElectionEffect
 from protocol.election import Election, Leads, LeadsNoMore
 from protocol.membership import Changed, Membership, Presence, Restarted
 from protocol.membership import Effect as MembershipEffect
-from protocol.messages import Authority, Reign, Warrant
+from protocol.messages import Authority, Reign, Vote, VoteRequest, Warrant
 from protocol.obedience import Obeys, ObeysNobody
 from protocol.roster import Roster
 
 AT_ONCE_S: Final = float("-inf")
 """A time that has passed."""
+
+TICK: Final = Tick()
 
 
 class Allegiance:
@@ -124,22 +126,31 @@ class Allegiance:
         return self.membership.incarnation(peer)
 
     def handle(self, event: Event, now_s: float) -> Iterable[Effect]:
-        """Pass an event on to election and membership, and do what they want."""
-        ended_s = self.election.lease_until_s, self.obeyed_until_s
-        match event:
-            case Heard(_, envelope):
-                heard = core.Heard(envelope.sender, envelope.incarnation, envelope.body)
-                self._join(self.membership.handle(heard, now_s))
-                self._vote(self.election.handle(heard, now_s))
-            case PeerAppeared() | PeerVanished():
-                self._join(self.membership.handle(event, now_s))
-                self._vote(self.election.handle(Tick(), now_s))
-            case Written():
-                self._vote(self.election.handle(event, now_s))
-            case _:
-                self._join(self.membership.handle(Tick(), now_s))
-                self._vote(self.election.handle(Tick(), now_s))
-        self._note_office(*ended_s, now_s)
+        """Pass an event on to election and membership, if it is for them or they are due, and do what they want."""
+        word: core.Heard | Written | None = None
+        if isinstance(event, Heard):
+            envelope = event.envelope
+            peer, incarnation, body = envelope.sender, envelope.incarnation, envelope.body
+            if self.membership.refresh(peer, incarnation, now_s):
+                self._membership_s = self.membership.due_s
+            else:
+                self._join(self.membership.handle(core.Heard(peer, incarnation, body), now_s))
+            if isinstance(body, Vote | VoteRequest) and not (
+                now_s < self._election_s and isinstance(body, Vote) and self.election.overhear(peer, body, now_s)
+            ):
+                word = core.Heard(peer, incarnation, body)
+        elif isinstance(event, PeerAppeared | PeerVanished):
+            self._join(self.membership.handle(event, now_s))
+        elif isinstance(event, Written):
+            word = event
+        elif now_s >= self._membership_s:
+            self._join(self.membership.handle(TICK, now_s))
+        if word is not None or now_s >= self._election_s:
+            ended_s = self.election.lease_until_s, self.obeyed_until_s
+            self._vote(self.election.handle(word or TICK, now_s))
+            self._note_office(*ended_s, now_s)
+        if not self._effects:
+            return ()
         effects, self._effects = self._effects, []
         return effects
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 from agents.role import RETRY_S, Effect, Event, Heard, WakeAt, Woken
 from protocol.messages import Point
@@ -33,6 +33,10 @@ class Part(Protocol):
         """Effects of one event, without a :class:`~agents.role.WakeAt`. The first event of all is being woken."""
 
 
+Turn: TypeAlias = tuple[Part, bool, bool]
+"""A part at an event: whether it is given the event, and whether it has a time to be asked for."""
+
+
 class Mind:
     """The role that its parts make up.
 
@@ -43,6 +47,8 @@ class Mind:
     def __init__(self, parts: Sequence[Part]) -> None:
         self.parts = tuple(parts)
         self.hears = frozenset[str]().union(*(part.hears for part in parts))
+        self._hearers = {kind: self._plan([kind in part.hears for part in parts]) for kind in self.hears}
+        self._all, self._others = self._plan([True] * len(self.parts)), self._plan([False] * len(self.parts))
 
     def start(self, now_s: float, position: Point) -> Iterable[Effect]:
         """Wake all parts for the first time."""
@@ -53,18 +59,29 @@ class Mind:
 
         A part that fails keeps none of the others from its work: what it failed on is raised when all have been asked.
         """
-        kind = event.envelope.kind if isinstance(event, Heard) else None
         failure: Exception | None = None
         wake_s = math.inf
-        for part in self.parts:
-            if kind is None or kind in part.hears:
+        for part, handles, wakes in self._turns(event):
+            if handles:
                 try:
-                    yield from part.handle(event, now_s)
+                    effects = part.handle(event, now_s)
+                    if effects:
+                        yield from effects
                 except Exception as problem:
                     failure = problem
                     wake_s = min(wake_s, now_s + RETRY_S)
                     continue
-            wake_s = min(wake_s, part.next_s)
+            if wakes and (next_s := part.next_s) < wake_s:
+                wake_s = next_s
         yield WakeAt(max(now_s, wake_s))
         if failure is not None:
             raise failure
+
+    def _turns(self, event: Event) -> Sequence[Turn]:
+        return self._hearers.get(event.address.kind, self._others) if isinstance(event, Heard) else self._all
+
+    def _plan(self, handles: Sequence[bool]) -> tuple[Turn, ...]:
+        """Turns of all parts that handle an event or have a time of their own, as most parts have."""
+        wakes = [getattr(type(part), "next_s", None) != math.inf for part in self.parts]
+        turns = zip(self.parts, handles, wakes, strict=True)
+        return tuple((part, handle, wake) for part, handle, wake in turns if handle or wake)

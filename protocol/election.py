@@ -131,6 +131,17 @@ class Election:
         effects.append(WakeAt(self._next_wake_s(now_s)))
         return effects
 
+    def overhear(self, peer: str, vote: Vote, now_s: float) -> bool:
+        """Take note of a vote for somebody else, as most are; False: :meth:`handle` has to see it.
+
+        Does what :meth:`handle` would while nothing is due: such a vote has no effects, and changes no time.
+        """
+        if vote.candidate == self._name:
+            return False
+        if peer in self._roster.names and peer != self._name:
+            self._count(peer, vote, now_s)
+        return True
+
     def leads(self, now_s: float) -> bool:
         """Whether it holds an unexpired lease."""
         return self.office is not None and now_s < self.lease_until_s
