@@ -100,13 +100,16 @@ class Vetting:
             and self._has_come(said.time_s, now_s)
             and self._counted(said.number, said.time_s)
             and self._is_near(said.anchor, 0.0)
-            and said.bound_m <= self._across_m
-            and said.range_m <= self._across_m + said.bound_m
+            and self.is_measure(said.range_m, said.bound_m)
         )
         if not fits:
             return None
         source = source_of(said.owner, said.start)
         return TimedRange(source, said.number, said.time_s, said.anchor, said.range_m, said.bound_m)
+
+    def is_measure(self, range_m: float, bound_m: float) -> bool:
+        """Whether there can be such a distance on the map, and whether the bound says anything."""
+        return bound_m <= self._across_m and range_m <= self._across_m + bound_m
 
     def digest(self, said: RangeDigest, peer: str, start: int, now_s: float) -> Digest | None:
         """The digest of a message of a peer's process; None if its clock is wrong."""

@@ -122,7 +122,7 @@ class SharedEstimate:
                         self._adopt(envelope.body, now_s)
 
     def measured(self, anchor: Point, range_m: float, bound_m: float, now_s: float) -> Iterable[Effect]:
-        """Share a range of this peer's own.
+        """Share a range of this peer's own, unless there can be none such on the map.
 
         Args:
             anchor: where from.
@@ -130,6 +130,9 @@ class SharedEstimate:
             bound_m: by which that is wrong at most.
             now_s: this peer's mission time.
         """
+        if not self._vetting.is_measure(range_m, bound_m):  # the answer came from somebody else, or was damaged
+            self._refused += 1
+            return ()
         self._said_s = max(now_s, self._said_s)
         self._own.append(self._ranges.record(self._said_s, anchor, range_m, bound_m))
         self._newest_s = max(self._newest_s, self._said_s)
