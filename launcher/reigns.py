@@ -57,6 +57,8 @@ class Takeover(msgspec.Struct, frozen=True, kw_only=True):
     """Who was obeyed then by all others that were there; None: nobody until the end of the recording."""
     took_s: float | None
     """Until then."""
+    back_after_s: float | None = None
+    """Until who had led recorded again; None: never, or it was only cut off."""
 
 
 @dataclass(frozen=True)
@@ -90,12 +92,12 @@ def find_reigns(records: Sequence[tuple[float, str, AnyRecord]]) -> Reigns:
         (time_s, record) for time_s, _, record in sorted(records, key=lambda entry: entry[0])
         if isinstance(record, Mishap)
     )  # fmt: skip
-    lives = {peer: _lives([time_s for time_s, _ in entries]) for peer, entries in by_peer.items()}
     voters = {peer for peer, entries in by_peer.items() if any(isinstance(record, Office) for _, record in entries)}
+    times_s = {peer: [time_s for time_s, _ in by_peer[peer]] for peer in voters}
     return Reigns(
         led=tuple(led),
         obeyed=tuple(obeyed),
-        takeovers=tuple(_takeovers(led, obeyed, mishaps, {peer: lives[peer] for peer in voters})),
+        takeovers=tuple(_takeovers(led, obeyed, mishaps, times_s)),
         mishaps=mishaps,
         broken=tuple(_broken(led, obeyed, records)) if voters else (),
     )
@@ -153,8 +155,10 @@ def _takeovers(
     led: Sequence[Spell],
     obeyed: Sequence[Spell],
     mishaps: Sequence[tuple[float, Mishap]],
-    lives: dict[str, list[tuple[float, float]]],
+    times_s: dict[str, list[float]],
 ) -> Iterator[Takeover]:
+    """What came of the mishaps of leaders; ``times_s`` of the records of each voter, ascending."""
+    lives = {peer: _lives(recorded_s) for peer, recorded_s in times_s.items()}
     for at_s, mishap in mishaps:
         before = next((spell for spell in reversed(led) if spell.from_s <= at_s), None)
         if mishap.over or mishap.kind not in _FELLED or before is None or before.peer not in mishap.who:
@@ -162,6 +166,8 @@ def _takeovers(
         if before.until_s < at_s - SILENT_S:
             continue  # it had ceased to lead before
         moments_s = sorted(spell.from_s for spell in obeyed if spell.from_s >= at_s and spell.epoch > before.epoch)
+        again_s = next((time_s for time_s in times_s[before.peer] if time_s > at_s + SLACK_S), None)
+        back_after_s = None if again_s is None or mishap.kind == "partition" else again_s - at_s
         after = None
         for moment_s in moments_s:
             there = {
@@ -178,9 +184,12 @@ def _takeovers(
                     before=before.peer,
                     after=only.leader,
                     took_s=moment_s - at_s,
+                    back_after_s=back_after_s,
                 )
                 break
-        yield after or Takeover(at_s=at_s, what=mishap.text, before=before.peer, after=None, took_s=None)
+        yield after or Takeover(
+            at_s=at_s, what=mishap.text, before=before.peer, after=None, took_s=None, back_after_s=back_after_s
+        )
 
 
 def _broken(

@@ -119,9 +119,11 @@ def _describe_rules(metrics: Metrics) -> list[str]:
 
 
 def _describe_takeover(takeover: Takeover) -> str:
+    back = "" if takeover.back_after_s is None else f"; {takeover.before} was back after {takeover.back_after_s:.1f} s"
     if takeover.took_s is None:
-        return f"{takeover.at_s:.1f} s: {takeover.what}, and nobody was obeyed by all others from then on"
-    return f"{takeover.at_s:.1f} s: {takeover.what}; all others obeyed {takeover.after} after {takeover.took_s:.2f} s"
+        return f"{takeover.at_s:.1f} s: {takeover.what}, and nobody was obeyed by all others from then on{back}"
+    others = f"all others obeyed {takeover.after} after {takeover.took_s:.2f} s"
+    return f"{takeover.at_s:.1f} s: {takeover.what}; {others}{back}"
 
 
 def _describe_contacts(contacts: tuple[Overlap, ...]) -> str:

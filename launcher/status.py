@@ -7,6 +7,7 @@ from rich.text import Text
 
 from agents.mission import Mission
 from launcher.observer import Status
+from launcher.wording import counted
 from protocol.messages import Point
 
 _COLOURS = {
@@ -27,12 +28,12 @@ def describe(status: Status, now_s: float) -> str:
     if status.deployment is None:
         return f"{up}, starting"
     chain = "chain connected" if status.chain_connected else "chain broken"
-    leads = f", {status.leader} leads" if status.leader else ", nobody leads"
+    leads = f", {_leader(status) or 'nobody'} leads"
     sight = "" if status.chain_connected else ", agent visible" if status.agent_visible else ", agent out of sight"
     if status.agent_visible is None:
         sight = f", agent {_whereabouts(status)}"
     goal = f", agent to {_place(status.goal)}" if status.goal else ""
-    return f"{up}{leads}, {chain}{sight}, {_relays(status)}, {status.links} lines of sight{goal}"
+    return f"{up}{leads}, {chain}{sight}, {_relays(status)}, {counted(status.links, 'line')} of sight{goal}"
 
 
 def draw(status: Status, mission: Mission, now_s: float) -> Table:
@@ -42,7 +43,8 @@ def draw(status: Status, mission: Mission, now_s: float) -> Table:
     sight = Text("agent visible", "green") if status.agent_visible else Text("agent out of sight", "red")
     if status.agent_visible is None:
         sight = Text(f"agent {_whereabouts(status)}")
-    leads = Text(f"{status.leader} leads") if status.leader else Text("nobody leads", "bold red")
+    leader = _leader(status)
+    leads = Text(f"{leader} leads") if leader else Text("nobody leads", "bold red")
     words = [Text("starting", "dim")] if status.deployment is None else [leads, chain, sight]
     table = Table(
         title=Text(" · ").join([Text(f"{mission.team}  {now_s:.0f}{length}"), *words]),
@@ -75,8 +77,13 @@ def _deployment(status: Status) -> str:
     return f"deployment {deployment.decision}: {deployment.reason}"
 
 
+def _leader(status: Status) -> str | None:
+    """Who leads; nobody, if it is not there, though its lease may still run."""
+    return status.leader if any(peer.up and peer.name == status.leader for peer in status.peers) else None
+
+
 def _relays(status: Status) -> str:
-    return f"{status.relays} relay{'' if status.relays == 1 else 's'}"
+    return counted(status.relays, "relay")
 
 
 def _whereabouts(status: Status) -> str:

@@ -191,10 +191,13 @@ def test_the_display_says_it_in_a_line_and_in_a_table(view: TeamView, mission: M
     view.handle(said("base", deployment(1), sequence=1), 0.0)
     status = view.status(0.0)
     assert describe(status, 12.34) == (
-        "  12.3 s  2/4 up, base leads, chain connected, 1 relay, 1 lines of sight, agent to 8.0, 2.0"
+        "  12.3 s  2/4 up, base leads, chain connected, 1 relay, 1 line of sight, agent to 8.0, 2.0"
     )
     console = Console(width=100, record=True, file=io.StringIO())
     console.print(draw(status, mission, 1.0))
     text = console.export_text()
     for word in ("chain connected", "robot1", "relay", "spare", "base station", "walks to 8.0, 2.0", "the agent left"):
         assert word in text
+    view.handle(PeerVanished("base"), 0.1)
+    assert view.leader(0.1) == "base", "its lease runs"
+    assert ", nobody leads, chain broken" in describe(view.status(0.1), 0.1)

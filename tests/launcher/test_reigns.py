@@ -76,7 +76,19 @@ def test_a_killed_leader_led_until_its_last_record_and_the_takeover_ends_when_al
     (takeover,) = reigns.takeovers
     assert (takeover.at_s, takeover.before, takeover.after) == (5.0, "base", "robot1")
     assert takeover.took_s == pytest.approx(1.2)
+    assert takeover.back_after_s == pytest.approx(4.0)
     assert reigns.broken == ()
+
+
+def test_a_leader_that_never_records_again_is_not_back_and_one_that_was_cut_off_had_not_gone() -> None:
+    for_good = [entry for entry in killed_leader() if entry[1] != "base" or entry[0] < 5.0]
+    cut_off = [
+        (time_s, peer, Mishap(kind="partition", who=("base",), text="base is cut off") if time_s == 5.0 else record)
+        if peer == "launcher" else (time_s, peer, record) for time_s, peer, record in killed_leader()
+    ]  # fmt: skip
+    for records in (for_good, cut_off):
+        (takeover,) = find_reigns(records).takeovers
+        assert (takeover.after, takeover.back_after_s) == ("robot1", None)
 
 
 def test_a_peer_that_is_not_there_need_not_obey() -> None:
