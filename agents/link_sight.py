@@ -5,8 +5,8 @@ A link of the team's tree is to hold from a stage on. Whether it does is judged 
 while nobody begins a stage before the others have finished the last but one.
 
 Of the agent no motion is certified. It is linked with a relay if that sees some place where the agent may be, from
-wherever a stage of the relay's way begins or ends. While it may be anywhere that holds of every relay: of
-no place is it known that it is not there.
+wherever a stage of the relay's way begins or ends. While it may be anywhere that holds of every relay: of no place
+is it known that it is not there.
 """
 
 from __future__ import annotations

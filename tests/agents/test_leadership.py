@@ -14,7 +14,7 @@ from msgspec import structs
 from agents.agent_knowledge import AgentKnowledge
 from agents.base_station import BaseStation
 from agents.collection import Collection
-from agents.dispatcher import PATIENCE_S
+from agents.dispatcher import PATIENCE_S, Dispatcher
 from agents.leader import Plan
 from agents.leadership import PLANNING, PREPARING, Leadership
 from agents.mind import Mind
@@ -24,12 +24,14 @@ from agents.planning_job import Answer, Question
 from agents.records import Connectivity, Decision, Ordered, Planned, Track
 from agents.reign_duty import AGAIN_S, GRACE_S, PACE_S, REPEAT_S
 from agents.role import Compute, Effect, Heard, JobDone
+from agents.setbacks import LONGEST_S, REST_S
 from planning.environment import Environment
 from protocol.keys import Address
 from protocol.messages import (
     AnyBody,
     Authority,
     Deployment,
+    Edge,
     Envelope,
     Heartbeat,
     Intent,
@@ -63,12 +65,38 @@ def plan(relay: Point = (2.0, 2.0), spare: Point = (3.0, 3.0), edges: Any = CHAI
 class Agreed:
     """A tree that everybody has agreed to, whatever it is."""
 
-    busy = collecting = False
+    busy = False
+    collecting = False
 
     def is_in_force(self, _edges: object) -> bool:
         return True
 
     def look(self, _now_s: float) -> list[Effect]:
+        return []
+
+
+class Refused(Agreed):
+    """A tree that somebody refuses at once, whatever it is; the one in force does not serve."""
+
+    def __init__(self) -> None:
+        self.proposed_s: list[float] = []
+        self.last: frozenset[frozenset[str]] = frozenset()
+
+    def is_in_force(self, _edges: object) -> bool:
+        return False
+
+    def may_propose(self, _now_s: float, *, urgent: bool) -> bool:
+        return urgent
+
+    def serves(self, _places: object, _now_s: float) -> bool:
+        return False
+
+    def propose(self, edges: Iterable[Edge], *wish: Any) -> list[Effect]:
+        self.proposed_s.append(wish[-1])
+        self.last = frozenset(map(frozenset, edges))
+        return []
+
+    def withdraw(self, _reason: str, _now_s: float) -> list[Effect]:
         return []
 
 
@@ -107,7 +135,10 @@ class Team(Life):
     The robots hear every deployment and obey it at once: what is released they have finished when they speak next.
     """
 
-    def __init__(self, mission: Mission, corner: Environment) -> None:
+    def __init__(self, mission: Mission, corner: Environment, tree: Any = None) -> None:
+        tree = Agreed() if tree is None else tree
+        self.mission, self.corner = mission, corner
+        self.tree = tree
         self.oracle = Oracle()
         self.speaking: dict[str, Point] = {"agent": (8.0, 2.0), "robot1": (1.0, 2.0), "robot2": (1.0, 3.0)}
         self.progress: dict[str, Progress] = {}
@@ -121,11 +152,10 @@ class Team(Life):
         self.allegiance.office = Reign(epoch=1, leader="base", incarnation=0)
         collection = Collection(self.allegiance, "agent")
         body = BaseStation(mission, corner, self.orders, collection, 0.0)
-        tree: Any = Agreed()
         leadership = Leadership(
             mission,
             self.allegiance,
-            tree,
+            self.tree,
             self.orders,
             collection,
             AgentKnowledge(collection, None),
@@ -499,6 +529,57 @@ def test_the_next_reign_holds_first_and_goes_on_from_what_was_said_before(team: 
     assert (motion.plan, motion.revision) == (0, 0)
     assert {said.decision for _, said in team.all_said(Deployment)[1:]} == {1}
     assert len(team.decisions) == 1, "the same links and places are the same decision"
+
+
+def test_nothing_is_asked_while_nothing_can_be_proposed_and_at_once_when_it_can(team: Team) -> None:
+    team = Team(structs.replace(team.mission, planning_period_s=100.0), team.corner)
+    team.tree.collecting = True
+    team.go_on(1.0)
+    assert not team.oracle.asked
+    team.tree.collecting = False
+    team.go_on(0.1)
+    assert len(team.oracle.asked) == 1
+
+
+@pytest.mark.parametrize("period_s", [0.05, 0.5, 100.0])
+def test_a_tree_that_is_refused_at_once_is_proposed_again_after_longer_and_longer(team: Team, period_s: float) -> None:
+    team = Team(structs.replace(team.mission, planning_period_s=period_s), team.corner, Refused())
+    team.go_on(12.0)
+    times_s = team.tree.proposed_s
+    gaps_s = [b - a for a, b in pairwise(times_s)]
+    assert 6 <= len(times_s) <= 11
+    assert gaps_s[0] < 0.8
+    # A long wait is as long as it may be, and until the next plan.
+    assert all(gap_s <= LONGEST_S + min(period_s, 1.0) + 0.1 for gap_s in gaps_s)
+    assert all(gap_s >= min(REST_S * 2**n, LONGEST_S) - 1e-6 for n, gap_s in enumerate(gaps_s))
+
+
+def test_another_tree_does_not_wait_for_one_that_was_refused(team: Team) -> None:
+    team = Team(team.mission, team.corner, Refused())
+    team.go_on(5.0)
+    refused = len(team.tree.proposed_s)
+    team.oracle.answer = plan(edges=(("base", "robot2"), ("robot2", "agent")))
+    team.go_on(0.7)
+    assert len(team.tree.proposed_s) > refused
+    assert frozenset(("base", "robot2")) in team.tree.last
+
+
+def test_who_is_heard_late_has_as_long_to_answer_the_order_to_hold(mission: Mission) -> None:
+    places = {"robot1": [(1.0, 2.0)], "robot2": [(1.0, 3.0)]}
+    dispatcher = Dispatcher("base", START, places, 1, 0.2)
+    held = Authority(epoch=1, leader="base", sequence=1)
+    dispatcher.said(held, 0.0)
+    obeying = State(position=(1.0, 2.0), velocity=(0.0, 0.0), mode="waiting", obeying=held)
+    silent = structs.replace(obeying, obeying=None)
+    dispatcher.hear("robot1", obeying, 0.1)
+    assert dispatcher.deaf(3.0) == ()
+    dispatcher.hear("robot2", silent, 3.0)
+    assert dispatcher.deaf(3.0) == dispatcher.deaf(3.0 + PATIENCE_S) == ()
+    dispatcher.hear("robot2", silent, 4.0)
+    assert dispatcher.deaf(3.1 + PATIENCE_S) == ("robot2",)
+    dispatcher.lose("robot2")
+    dispatcher.hear("robot2", silent, 6.0)
+    assert dispatcher.deaf(6.1) == ()
 
 
 def test_a_robot_that_does_not_answer_the_order_to_hold_is_done_without(team: Team) -> None:

@@ -138,8 +138,15 @@ def test_a_relay_is_linked_with_the_agent_if_it_sees_some_place_where_that_may_b
     motion = Motion(plan=1, revision=2, first_stage=3, released=2, ways=(way,), connection="none")
     link_of_agent = ("robot1", "agent")
     hidden, open_, both = ((5.0, 3.0),), ((1.0, 11.0),), ((5.0, 3.0), (1.0, 11.0))
-    for may_be, stage in ((hidden, 5), (open_, 3), (both, 3), ((), None), (((7.5, 10.0),), None)):
+    for may_be, stage in ((hidden, 5), (open_, 3), (both, 3), ((), None), (((7.5, 10.0),), None), (None, 3)):
         assert stages_in_sight(Scene(PILLARS, motion, {}, "agent", may_be), [link_of_agent]) == [stage]
+
+
+def test_an_agent_that_may_be_anywhere_is_refused_by_nobody_whose_own_place_is_known() -> None:
+    scene = Scene(PILLARS, None, {"robot1": (1.0, 3.0)}, "agent", None)
+    assert stages_in_sight(scene, [("robot1", "agent"), ("robot2", "agent")]) == [0, None]
+    (view,) = judge_links(scene, "robot1", [link(None, ("robot1", "agent"))])
+    assert (view.peer, view.verdict) == ("agent", "sees")
 
 
 def test_an_announced_way_is_looked_at_from_where_the_agent_is_to_some_metres_on() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from msgspec import structs
 
-from agents.range_message import MOST_RANGES
+from agents.range_message import MOST_RANGES, MOST_SOURCES
 from agents.role import Heard, Publish, Woken
 from agents.shared_estimate import REPEATED, SharedEstimate
 from launcher.fault_timetable import Clock, Cut, Delay, Duplicate, Fault, Kill, Loss, Partition, Pause
@@ -178,6 +178,23 @@ def test_sources_are_bounded() -> None:
     for start in range(500):
         list(estimate.handle(heard(Ranges(ranges=(a_range(start=start, number=0),))), 5.0))
     assert len(estimate.ranges.log) <= 128
+
+
+def test_sources_are_bounded_whatever_one_message_says() -> None:
+    estimate = fresh()
+    for first in range(0, MOST_SOURCES + 20, 30):
+        said = tuple(a_range(start=first + start, number=0) for start in range(30))
+        list(estimate.handle(heard(Ranges(ranges=said)), 5.0))
+    assert len(estimate.ranges.log.heard) == MOST_SOURCES
+
+
+def test_sources_are_bounded_whatever_a_base_says() -> None:
+    for count, taken in ((MOST_SOURCES, True), (MOST_SOURCES + 1, False)):
+        estimate = fresh()
+        base = a_base(heard=tuple(HeardRanges(owner="robot1", start=start, below=10) for start in range(count)))
+        list(estimate.handle(heard(base), 4.5))
+        assert (estimate.target(4.5) is not None) is taken
+        assert len(estimate.ranges.log.heard) == (count if taken else 0)
 
 
 def a_base(**changes: object) -> RangeBase:

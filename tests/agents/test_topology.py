@@ -13,7 +13,7 @@ from agents.orders import first_orders
 from agents.records import LogLine, TopologyChange
 from agents.role import Compute, Heard, JobDone, Publish, Record, Woken
 from agents.standing_orders import StandingOrders
-from agents.topology import TeamTree
+from agents.topology import FORESEEING, JUDGING, TeamTree
 from planning.environment import Environment
 from protocol.keys import Address
 from protocol.membership import Presence
@@ -82,6 +82,9 @@ class Team:
         mission = structs.replace(mission, roster=tuple(entries))
         self.body = Body(robot)
         self.deaf: set[str] = set()
+        self.fails: set[str] = set()
+        """Jobs that do."""
+        self.jobs: list[str] = []
         self.changes: list[TopologyChange] = []
         self.logs: list[str] = []
         self.words: list[Topology] = []
@@ -105,6 +108,10 @@ class Team:
     @property
     def leader(self) -> TeamTree:
         return self.parts["base"]
+
+    def links(self, name: str) -> tuple[Edge, ...]:
+        """That a peer keeps."""
+        return self.parts[name].held.links
 
     def order(self, motion: Motion | None, now_s: float) -> None:
         authority = Authority(epoch=EPOCH, leader="base", sequence=int(1000 * now_s) + 1)
@@ -135,7 +142,11 @@ class Team:
                 case Record(LogLine(text=text)):
                     self.logs.append(text)
                 case Compute(job=job, function=function, arguments=arguments):
+                    self.jobs.append(job)
+                    assert len(self.jobs) < 1000, "jobs without end"
                     done = JobDone(job, function(*arguments), 0.01)
+                    if job in self.fails:
+                        done = JobDone(job, None, 0.01, "ValueError: no")
                     self.carry_out(name, self.parts[name].handle(done, now_s), now_s)
 
 
@@ -170,12 +181,11 @@ def test_a_tree_is_in_force_when_the_robot_has_accepted_the_motion_to_it_and_not
     team.carry_out("base", team.leader.propose(FAR, TO_THE_CORNER, "optimum", "it is far", 0.2), 0.2)
     team.order(TO_THE_CORNER, 0.25)
     team.pass_time(0.3, 1.3)
-    assert team.leader.busy and not team.leader.is_in_force(FAR)
-    assert team.parts["robot1"].held.committed is None
+    assert (team.leader.busy, team.leader.is_in_force(FAR), team.links("robot1")) == (True, False, ())
     team.body.accept(TO_THE_CORNER)
     team.pass_time(1.3, 1.4)
     assert team.leader.is_in_force(FAR) and not team.leader.busy
-    assert team.parts["robot1"].held.links == team.leader.held.links == FAR
+    assert team.links("robot1") == team.links("base") == FAR
     (change,) = team.changes
     assert change.committed and change.number == (EPOCH, 0) and change.new == FAR and change.released == ()
     assert change.reason == "it is far" and change.rounds > 3
@@ -191,7 +201,7 @@ def test_the_next_tree_asks_about_new_links_only_and_keeps_the_old_ones_until_it
     assert not team.leader.may_propose(0.4, urgent=False) and team.leader.may_propose(0.4, urgent=True)
     team.carry_out("base", team.leader.propose(FAR, TO_THE_CORNER, "auction", "it goes", 0.4), 0.4)
     team.order(TO_THE_CORNER, 0.4)
-    assert team.parts["robot1"].held.links == NEAR
+    assert team.links("robot1") == NEAR
     team.body.accept(TO_THE_CORNER)
     team.pass_time(0.4, 0.6)
     first, second = team.changes
@@ -208,7 +218,7 @@ def test_who_is_not_heard_is_named_when_a_proposal_is_given_up() -> None:
     team.pass_time(0.2, 0.2 + ROUNDS * ROUND_S + 0.1)
     (change,) = team.changes
     assert not change.committed and change.reason == f"no answer in {ROUNDS} rounds from robot1"
-    assert not team.leader.busy and team.leader.held.links == ()
+    assert not team.leader.busy and team.links("base") == ()
 
 
 def test_links_whose_ends_will_not_see_each_other_are_not_even_proposed() -> None:
@@ -232,15 +242,59 @@ def test_a_robot_refuses_what_the_leader_claims_and_is_not_so() -> None:
     assert "refuses the link with" in change.reason and "robot1" in change.reason
 
 
+def test_links_that_cannot_be_judged_are_refused_and_not_judged_again() -> None:
+    team = Team(agent=(9.0, 4.0))
+    team.fails = {JUDGING}
+    team.body.accept(TO_THE_CORNER)
+    for now_s in (0.2, 0.6):
+        team.carry_out("base", team.leader.propose(FAR, TO_THE_CORNER, "optimum", "it is far", now_s), now_s)
+        team.order(TO_THE_CORNER, now_s)
+        team.pass_time(now_s, now_s + 0.3)
+    assert [change.committed for change in team.changes] == [False, False]
+    assert "could not judge it: ValueError: no" in team.changes[0].reason
+    assert team.jobs.count(JUDGING) <= 4, "each end judges each proposal once"
+    said = [text for text in team.logs if "could not be judged" in text]
+    assert 1 <= len(said) <= 2, "each end says it once"
+    team.fails.clear()
+    team.carry_out("base", team.leader.propose(FAR, TO_THE_CORNER, "optimum", "it is far", 1.0), 1.0)
+    team.order(TO_THE_CORNER, 1.0)
+    team.pass_time(1.0, 1.3)
+    assert team.leader.is_in_force(FAR)
+
+
+def test_why_a_tree_is_not_proposed_is_said_once() -> None:
+    team = Team(agent=(9.0, 4.0))
+    team.fails = {FORESEEING}
+    for now_s in (0.2, 0.3, 0.4):
+        team.carry_out("base", team.leader.propose(FAR, None, "optimum", "it is far", now_s), now_s)
+        assert not team.leader.busy
+    assert [text for text in team.logs if "does not propose" in text] == [
+        "does not propose the links base\N{EN DASH}robot1, robot1\N{EN DASH}agent: ValueError: no"
+    ]
+
+
+def test_the_leader_is_woken_when_it_has_collected_what_was_in_force() -> None:
+    team = Team(agent=(2.0, 1.0))
+    part, robot = team.leader, team.allegiances["robot1"]
+    team.deaf = {"robot1"}
+    team.allegiances["base"].office = Reign(epoch=EPOCH + 1, leader="base", incarnation=0)
+    team.carry_out("base", part.handle(Woken((0.0, 0.0)), 1.0), 1.0)
+    assert robot.presence("robot1") is Presence.PRESENT
+    assert (part.collecting, part.next_s > 0.0) == (True, True)
+    team.carry_out("base", part.handle(heard("robot1", Confirmation()), 1.1), 1.1)
+    assert (part.collecting, part.next_s > 0.0) == (False, False), "else nobody asks before the next plan is due"
+    assert part.may_propose(1.1, urgent=False)
+
+
 def test_words_that_are_not_in_force_are_not_heard() -> None:
     team = Team(agent=(2.0, 1.0))
     team.carry_out("base", team.leader.propose(NEAR, None, "optimum", "it is near", 0.2), 0.2)
     team.order(None, 0.2)
     team.pass_time(0.2, 0.3)
     robot, late = team.parts["robot1"], team.words[0]
-    assert late.committed is None and robot.held.links == NEAR
+    assert late.committed is None and team.links("robot1") == NEAR
     robot.handle(heard("base", late), 0.4)
-    assert robot.held.links == NEAR and robot.held.proposal is None
+    assert team.links("robot1") == NEAR and robot.held.proposal is None
 
 
 def test_a_tree_that_is_none_is_not_taken_and_that_is_said_once() -> None:
@@ -250,7 +304,7 @@ def test_a_tree_that_is_none_is_not_taken_and_that_is_said_once() -> None:
         authority = Authority(epoch=EPOCH, leader="base", sequence=sequence)
         fault = structs.replace(NO_TREE, authority=authority)
         team.carry_out("robot1", robot.handle(heard("base", fault), 0.4), 0.4)
-    assert robot.held.links == ()
+    assert team.links("robot1") == ()
     assert [text for text in team.logs if "does not take" in text] == [
         "does not take the word of base: tree 1 of epoch 3 is none: agent is not joined to base"
     ]

@@ -53,9 +53,9 @@ def mission() -> Mission:
 class Play:
     """A mission with faults, and what its peers recorded."""
 
-    def __init__(self, *faults: Fault, until_s: float, without: str = "") -> None:
+    def __init__(self, *faults: Fault, until_s: float, without: str = "", period_s: float = 0.5) -> None:
         self.records: list[tuple[float, str, AnyRecord]] = []
-        what = mission()
+        what = structs.replace(mission(), planning_period_s=period_s)
         what = structs.replace(what, roster=tuple(entry for entry in what.roster if entry.name != without))
         self.team = SimulatedTeam(
             what,
@@ -155,6 +155,14 @@ def test_a_leader_that_hangs_is_replaced_and_what_it_says_late_is_refused() -> N
     assert play.logs("base", "leads no more")
     assert all(reign.leader == second for _, reign, begin_s, _ in play.spans("obeys") if begin_s > 5.5)
     assert play.plans()[-1][1] == second
+
+
+def test_the_next_leader_plans_as_soon_as_it_can_however_long_its_planning_period_is() -> None:
+    play = Play(Pause(at_s=5.0, for_s=9.0, who="base"), until_s=10.0, period_s=30.0)
+    taken_s, second = play.leaders()[-1]
+    assert second != "base"
+    first_s = min(time_s for time_s, peer, *_ in play.plans() if peer == second)
+    assert first_s < taken_s + 1.0
 
 
 def test_who_is_cut_off_with_less_than_half_holds_and_says_so_once() -> None:

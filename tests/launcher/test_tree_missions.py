@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from msgspec import structs
 
+from agents.mission import Scripted
 from agents.records import TopologyChange
 from launcher.fault_timetable import LEADER, Kill, Timetable
 from launcher.mission_trace import MissionTrace
@@ -12,7 +13,7 @@ from launcher.report import measure
 from launcher.report_trees import describe_trees, settled_proposals
 from launcher.simulation import simulate
 from protocol.messages import Method
-from tests.launcher.test_simulation import CORNER, around_the_corner
+from tests.launcher.test_simulation import CORNER, around_the_corner, team
 
 KILLED_S = 7.0
 
@@ -61,6 +62,18 @@ def test_decisions_are_taken_when_their_tree_is_in_force(trace: MissionTrace) ->
     for at_s, decision in trace.decisions:
         in_force = [change for when_s, _, change in trace.trees if change.committed and when_s <= at_s]
         assert in_force and set(map(frozenset, in_force[-1].edges)) == set(map(frozenset, decision.deployment.edges))
+
+
+def test_an_agent_that_nobody_sees_or_hears_is_found_and_linked() -> None:
+    hidden = team(Scripted(goals=()), (1.5, 11.0), (11.0, 1.5), [(0.7, 11.0), (2.3, 11.0)])
+    trace = simulate(structs.replace(hidden, announces=False), CORNER, duration_s=14.0)
+    metrics = measure(trace, CORNER)
+    assert min(at_s for at_s, _, change in trace.trees if change.committed) < 1.5
+    assert metrics.first_deployment_s is not None and metrics.first_deployment_s < 1.5
+    assert metrics.relays_at_most >= 1 and metrics.total_distance_m > 5.0
+    # From the one corridor into the other it is some metres; then base, relay and agent are one chain to the end.
+    assert metrics.whole_run.chain_connected > 0.3
+    assert not [line for _, _, line in trace.logs if "does not propose" in line.text]
 
 
 def test_the_report_lists_them(trace: MissionTrace, method: Method) -> None:
