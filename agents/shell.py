@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable
+from functools import lru_cache
 from typing import Final, Literal, TypeAlias
 
 from agents.driver import RobotDriver
@@ -39,6 +40,9 @@ from protocol.messages import Envelope, Goal, MalformedMessage, decode, encode, 
 MAXIMUM_OPERATORS: Final = 64
 """Operators remembered at a time. Their names are not on the roster, so that the memory must be bounded."""
 
+_address: Final = lru_cache(maxsize=1024)(parse)
+"""The same few keys come again and again."""
+
 Refusal: TypeAlias = str
 """Why a publication was not heard: it is foreign, malformed, impersonated, misplaced or stale, or of a stranger."""
 
@@ -58,6 +62,7 @@ class PeerShell:
         record: puts a record of this peer into the recording: ``record(time_s, record)``.
         execute: starts a computation, which is to end in :meth:`finish`. Must not call it before it returns.
         persist: puts a promise on disk, which is to end in :meth:`written`, likewise not before it returns.
+        decode: envelope of a payload; in simulation all peers share what one of them has decoded.
     """
 
     def __init__(
@@ -75,6 +80,7 @@ class PeerShell:
         record: Callable[[float, AnyRecord], None],
         execute: Callable[[Compute], None],
         persist: Callable[[Persist], None],
+        decode: Callable[[bytes], Envelope] = decode,
     ) -> None:
         self.wake_at_s = math.inf
         """Mission time at which :meth:`wake` is due."""
@@ -94,6 +100,7 @@ class PeerShell:
         self._record = record
         self._execute = execute
         self._persist = persist
+        self._decode = decode
         self._sequence = 0
         self._heard: dict[tuple[str, str], tuple[int, int]] = {}
         self._incarnations: dict[str, int] = {}
@@ -142,7 +149,7 @@ class PeerShell:
 
     def _examine(self, publication: Received) -> Heard | Refusal:
         """The message of a publication, or why it is refused; empty for one's own echo."""
-        address = parse(publication.key)
+        address = _address(publication.key)
         if address is None or address.team != self._team:
             return "foreign"
         if address.speaker == self._name and not address.operator:
@@ -150,7 +157,7 @@ class PeerShell:
         if not address.operator and address.speaker not in self._peers:
             return "stranger"
         try:
-            envelope = decode(publication.payload)
+            envelope = self._decode(publication.payload)
         except MalformedMessage:
             return "malformed"
         if envelope.sender != address.speaker:

@@ -19,16 +19,16 @@ from launcher.body_rules import BodyRules
 from launcher.fault_timetable import Kill, Timetable
 from launcher.kept_memory import count_kept
 from launcher.order_rules import MotionRules, OrderRules
-from launcher.simulated_peer import SimulatedPeer, holds_lease
+from launcher.simulated_peer import SimulatedPeer, decode_shared, holds_lease
 from launcher.simulation import SimulatedTeam
 from launcher.tree_rules import TreeRules
 from launcher.violation import Violation
-from protocol.messages import Envelope, Reign, decode
+from protocol.messages import Envelope, Reign
 
 LOOK_S: Final = 1.0
 """How often it is looked what peers know."""
 
-COUNT_S: Final = 5.0
+COUNT_S: Final = 10.0
 """How often it is counted what they keep."""
 
 MOST_KEPT: Final[Mapping[type[object], int]] = {Allegiance: 200, SharedEstimate: 20_000, PeerShell: 30_000}
@@ -74,7 +74,7 @@ class Invariants:
     def _hear(self, peer: SimulatedPeer, key: str, payload: bytes) -> None:
         """Called in the middle of an event, where whatever is raised would count as a failure of the role."""
         if key.rpartition("/")[2] in JUDGED_KINDS and self._found is None:
-            envelope = decode(payload)
+            envelope = decode_shared(payload)
             try:
                 for rules in self._rules:
                     rules.hear(peer, envelope)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping, Set
+from collections.abc import Mapping, Sequence, Set
 from typing import Any, Final
 
 from agents.casting import Casting
@@ -12,6 +12,11 @@ from protocol.roster import Roster
 
 OURS: Final = ("agents.", "protocol.", "estimation.")
 """Objects of these packages are looked into; maps, arrays and the rest of the world are not the mind's."""
+
+CONTAINERS: Final = (dict, list, tuple, Set, Mapping, deque)
+
+PLAIN: Final = frozenset({str, bytes, int, float, bool, type(None)})
+"""Types in which nothing is kept."""
 
 SHARED: Final = (Mission, Roster, Casting)
 """What all peers of a simulation have in common; of planners a mind keeps but a way to ask for them."""
@@ -25,19 +30,20 @@ def count_kept(root: object) -> int:
         if id(thing) in seen:
             continue
         seen.add(id(thing))
-        inside = _inside(thing)
-        if isinstance(thing, Mapping | Set | list | tuple | deque):
+        if isinstance(thing, CONTAINERS):
             count += len(thing)
-        ahead += [other for other in inside if not isinstance(other, str | bytes | int | float | type(None))]
+        ahead += [other for other in _inside(thing) if type(other) not in PLAIN]
     return count
 
 
-def _inside(thing: Any) -> list[Any]:
+def _inside(thing: Any) -> Sequence[Any]:
+    kind = type(thing)
+    if kind is tuple or kind is list:
+        return thing  # type: ignore[no-any-return]
     if isinstance(thing, Mapping):
         return [*thing.keys(), *thing.values()]
-    if isinstance(thing, Set | list | tuple | deque):
+    if isinstance(thing, CONTAINERS):
         return list(thing)
-    kind = type(thing)
     if not kind.__module__.startswith(OURS) or isinstance(thing, SHARED):
         return []
     if hasattr(kind, "__struct_fields__"):

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from copy import copy
+from functools import lru_cache
 from random import Random
 from typing import TYPE_CHECKING, Final, TypeVar
 
@@ -18,6 +19,7 @@ from agents.role import Compute, JobDone, Persist, Role, Written
 from agents.shell import PeerShell
 from protocol.bus import BusEvent
 from protocol.inbox import Inbox
+from protocol.messages import decode
 from protocol.promises import decode_promise
 
 if TYPE_CHECKING:
@@ -28,6 +30,9 @@ if TYPE_CHECKING:
     from protocol.simulated_bus import SimulatedNetwork, VirtualTime
 
 APart = TypeVar("APart")
+
+decode_shared: Final = lru_cache(maxsize=4096)(decode)
+"""Envelopes are values: what one hearer has decoded serves all others, and the rules."""
 
 WRITING_S: Final = 0.003
 """How long a sound disk takes to keep a promise."""
@@ -210,11 +215,12 @@ class SimulatedPeer:
             team=self._mission.team,
             incarnation=self.incarnation,
             peers=[entry.name for entry in self._mission.roster],
-            now=lambda: self.now_s,
+            now=self._read_clock,
             wall_clock=lambda: self._mission.epoch_unix_s + self.now_s,
             record=lambda _, record: self._record(self._time.now_s, self.name, record),
             execute=self._execute,
             persist=self._persist,
+            decode=decode_shared,
         )
         shell.start()
         self._sleep()
@@ -276,6 +282,9 @@ class SimulatedPeer:
     def close(self) -> None:
         """The bus of its shell; it is closed by :meth:`kill`."""
 
+    def _read_clock(self) -> float:
+        return self.clock.read(self._time.now_s)
+
     def _take(self, event: BusEvent) -> None:
         if self._waiting is None:
             self._pass_on(event)
@@ -294,13 +303,12 @@ class SimulatedPeer:
     def _pass_on(self, event: BusEvent | JobDone | Written) -> None:
         shell = self.shell
         assert shell is not None
-        match event:
-            case JobDone():
-                shell.finish(event)
-            case Written():
-                shell.written(event)
-            case _:
-                shell.take(event)
+        if isinstance(event, JobDone):
+            shell.finish(event)
+        elif isinstance(event, Written):
+            shell.written(event)
+        else:
+            shell.take(event)
         self._end_event()
 
     def _end_event(self) -> None:
