@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from agents.whereabouts import Aim
 from protocol import messages
 from protocol.messages import Auction, Authority, Offer, Placement, Point, Warrant
+
+ROUNDING: Final = 1e-6
+"""The shares of an aim add up to 1 but for this."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,8 +67,8 @@ def from_auction(auction: Auction) -> Lot:
     """The lot of a message.
 
     Raises:
-        ValueError: an aim has more places than shares or fewer, or shares that are none, or the chain has a relay of
-            which no place is said, or one twice.
+        ValueError: an aim has more places than shares or fewer, or its shares are not of sum 1; or the chain has a
+            relay of which no place is said, or one twice.
     """
     robots = {placement.robot: placement.position for placement in auction.robots}
     if unknown := [name for name in auction.standing if name not in robots]:
@@ -75,5 +79,7 @@ def from_auction(auction: Auction) -> Lot:
     for aim in auction.aims:
         if len(aim.places) != len(aim.shares):
             raise ValueError(f"an aim has {len(aim.places)} places and {len(aim.shares)} shares: give as many")
+        if abs(sum(aim.shares) - 1.0) > ROUNDING:
+            raise ValueError(f"the shares of an aim add up to {sum(aim.shares):g} and not to 1")
         aims.append(Aim(np.array(aim.places), np.array(aim.shares), aim.ahead_m, "", ""))
     return Lot(auction.center, tuple(aims), robots, auction.standing, auction.obstacles)

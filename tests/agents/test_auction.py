@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 import maps
 from agents.auction import AGAIN_S, BIDDING, DESCRIBING, OPEN_S, Auctioneer
@@ -112,6 +113,72 @@ def test_without_a_relay_the_link_to_the_agent_is_the_base_stations(planner: Dep
         assert not any(offer.removed for name in lot.robots for offer in planner.bid(lot, name))
         removed |= {offer.removed for offer in planner.bid(lot, "base")}
     assert {frozenset(edge) for edge in removed if edge} == {frozenset(("base", "agent"))}
+
+
+def test_robots_that_say_that_they_are_in_a_wall_are_bid_for_where_they_can_be(planner: DeploymentPlanner) -> None:
+    rng = np.random.default_rng(23)
+    for _ in range(4):
+        stops = places(planner, rng, 2)
+        robots = {"robot1": stops[1], "robot2": (-1e7, 1e7)}
+        lot = Lot(stops[0], announce([stops[0]]).aims, robots, ("robot2",))
+        nearest = tuple(planner.graph.geodesics.nearest((-1e7, 1e7)).tolist())
+        beside = Lot(lot.center, lot.aims, {**robots, "robot2": nearest}, lot.standing)
+        assert [planner.bid(lot, name) for name in ("base", *robots)] == [
+            planner.bid(beside, name) for name in ("base", *robots)
+        ]
+
+
+def test_an_offer_counts_only_if_its_chain_is_one_on_the_map(planner: DeploymentPlanner) -> None:
+    rng = np.random.default_rng(24)
+    judged = 0
+    for _ in range(20):
+        stops = places(planner, rng, 4)
+        robots = {f"robot{n}": place for n, place in enumerate(stops[1:], 1)}
+        lot = Lot(stops[0], announce([stops[0]]).aims, robots, ("robot1", "robot2"))
+        bids = (one for name in ("base", *robots) for one in planner.bid(lot, name))
+        offers = [one for one in bids if one.whole and len(one.relays) > 1]
+        if not offers:
+            continue
+        judged += 1
+        good = structs.replace(offers[0], total_cost_m=0.0)
+
+        def won(bad: Offer, aims: Any = lot.aims, robots: Any = robots) -> bool:
+            """Whether an offer that is cheaper than all is awarded."""
+            return bool(planner._proposer.award(Bids(aims, {"robot1": (bad,)}), robots))
+
+        first, *others = good.relays
+        x, y = first.position
+        far = next(
+            (px, py)
+            for px, py in planner.graph.positions.tolist()
+            if not planner.graph.environment.line_of_sight(planner._base, (px, py))
+        )
+        assert won(good)
+        for position in ((x + 0.001, y), (1e7, 1e7), far, others[0].position):
+            moved = structs.replace(first, position=position)
+            assert not won(structs.replace(good, relays=(moved, *others))), position
+        blind = structs.replace(good, relays=good.relays[:-1])
+        sees = planner.graph.environment.line_of_sight(good.relays[-2].position, lot.aims[0].places)
+        assert won(blind) == bool(np.all(sees)), "the last relay sees the agent, or the chain ends before it"
+        assert not won(structs.replace(good, relays=()))
+    assert judged > 3
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"standing": ("robot1", "robot1")}, "twice a relay"),
+        ({"standing": ("robot7",)}, "its place is not said"),
+        ({"shares": (0.5, 0.5)}, "1 places and 2 shares"),
+        ({"shares": (0.0,)}, "add up to 0 and not to 1"),
+    ],
+)
+def test_lots_that_make_no_sense_are_refused(change: dict[str, Any], sentence: str) -> None:
+    auction = to_auction(FakePlanner.lot_found, 9, 0.2, AUTHORITY, WARRANT)
+    if "shares" in change:
+        change = {"aims": (structs.replace(auction.aims[0], **change),)}
+    with pytest.raises(ValueError, match=sentence):
+        from_auction(structs.replace(auction, **change))
 
 
 class FakePlanner:

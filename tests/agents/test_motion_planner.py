@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from msgspec import structs
 
 from agents.assignment import assign
 from agents.certificate_judge import certificate_judge
-from agents.leader import DeploymentPlanner
+from agents.leader import DeploymentPlanner, Plan
 from agents.mission import Mission, RosterEntry
 from agents.motion_message import end_stage, to_schedule
 from agents.motion_planner import MotionPlanner, Option
@@ -23,7 +24,7 @@ from agents.whereabouts import announce
 from planning.certificate import certify
 from planning.compiled_map import CompiledMap
 from planning.environment import Environment
-from protocol.messages import Motion, Point, Progress
+from protocol.messages import Motion, Placement, Point, Progress
 from tests.agents.conftest import make_mission
 
 HALL = Environment([(0, 0), (20, 0), (20, 4), (12, 4), (12, 12), (8, 12), (8, 4), (0, 4)], name="hall")
@@ -213,6 +214,32 @@ def test_of_an_agent_that_is_only_measured_no_sight_is_promised_but_how_long_it_
     check_certified(answer.course.motion, HALL, None)
     nothing = planner.plan(Question(way=(), onset=onset, lead_s=0.0, previous=None, heading={}))
     assert nothing.in_sight_s == 0.0
+
+
+def test_who_says_that_it_is_where_none_can_be_is_left_out_and_keeps_nobody(team_planner: TeamPlanner) -> None:
+    """Off the map, or deep in a wall; so near to a wall that its disc reaches into it, it is taken to be beside it."""
+    places = {"robot1": (2.0, 0.1), "robot2": (1e7, -1e7)}
+    spare = Placement(robot="robot1", position=(-9.0, -9.0), spare=True)
+    before = Plan((spare,), (("base", "agent"),), 1.0, 0, True, "what another leader may have said")
+    relay = replace(before, placements=(structs.replace(spare, spare=False),))
+    for previous, others in ((None, ()), (before, ((4.0, 3.0),)), (relay, ((4.0, 3.0), (4.5, 3.0)))):
+        lost = {"robot3": np.array([(-50.0, 1.0), *others])}
+        question = Question(
+            way=((10.0, 11.0),), onset=stand(BASE, **places), lead_s=0.0, previous=previous, heading={}, lost=lost
+        )
+        answer = team_planner.plan(question)
+        assert answer.failure == "" and answer.course is not None
+        assert [place.robot for place in answer.plan.placements] == ["robot1"]
+        assert HALL.inflated(0.2).contains([place.position for place in answer.plan.placements]).all()
+        ways = {way.member: way for way in answer.course.motion.ways}
+        assert "robot2" not in ways and ("robot3" in ways) == bool(others)
+        assert ways["robot1"].waypoints[0] == pytest.approx((2.0, 0.2))
+        assert not others or set(ways["robot3"].waypoints) == set(others)
+        assert answer.course.reason.endswith(
+            "robot2 says that it is at (10000000, -10000000) m, where no robot can be, and is left out"
+        )
+    nobody = team_planner.plan(replace(question, onset=stand(BASE, robot2=(1e7, -1e7)), previous=None))
+    assert nobody.course is None and "robot2 says that it is at" in nobody.plan.reason
 
 
 def test_goals_keep_apart_from_each_other_and_from_the_lost(team_planner: TeamPlanner) -> None:

@@ -108,6 +108,15 @@ def test_an_answer_becomes_a_range_as_wide_as_the_agent_can_have_walked(round_tr
     assert shared.ranges[0].bound_m == record.bound_m
 
 
+@pytest.mark.parametrize(("range_m", "bound_m"), [(1e7, 0.2), (1.0, 1e7)])
+def test_an_answer_that_cannot_be_is_no_range(range_m: float, bound_m: float) -> None:
+    part, estimate = asker()
+    request = ask(part, 5.0)
+    reply = RangeReply(asker="robot1", correlation=request.correlation, range_m=range_m, bound_m=bound_m)
+    assert not list(part.handle(heard(reply, "agent"), 5.01))
+    assert not len(estimate.ranges.log)
+
+
 def test_answers_that_are_late_doubled_or_for_others_are_left_out() -> None:
     part, estimate = asker()
     request = ask(part, 5.0)

@@ -225,7 +225,13 @@ class Mischief:
         """A valid body of any kind, with any content that its types allow."""
         kind = self.chance.choice(self._kinds)
         body: AnyBody = msgspec.convert(self._value(SHAPES[kind]), BODIES[kind])  # type: ignore[assignment]
-        return body
+        return self._mend(body) if isinstance(body, Auction) and self.chance.random() < 0.8 else body
+
+    def _mend(self, auction: Auction) -> Auction:
+        """An auction that is bid in: each place of an aim counts as much, and the chain is of robots in it."""
+        aims = tuple(structs.replace(aim, shares=(1.0 / len(aim.places),) * len(aim.places)) for aim in auction.aims)
+        robots = tuple(dict.fromkeys(placement.robot for placement in auction.robots))
+        return structs.replace(auction, aims=aims, standing=robots[: self.chance.randrange(3)])
 
     def _example(self) -> AnyBody:
         return self.chance.choice(self._examples)

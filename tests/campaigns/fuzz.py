@@ -35,7 +35,7 @@ LIFE: Final = 4000
 """Inputs that one peer gets."""
 STEP_S: Final = 0.01
 """Mission time between two inputs."""
-JOBS_EVERY: Final = 200
+JOBS_EVERY: Final = 100
 """After so many inputs one of the jobs that wait is done, whichever it is."""
 MOST_JOBS: Final = 8
 """If more wait, the oldest never end, as if the machine were busy."""

@@ -84,6 +84,20 @@ def test_overlapping_kills_and_pauses_end_with_the_last_of_them() -> None:
     assert team.faults.quiet_since_s == 6.0
 
 
+def test_a_process_that_begins_within_a_pause_is_paused() -> None:
+    _, team = team_with(
+        Pause(at_s=2.0, for_s=4.0, who="robot1"), Kill(at_s=3.0, for_s=1.0, who="robot1"),
+        Kill(at_s=2.0, for_s=2.0, who="robot2"), Pause(at_s=3.0, for_s=2.0, who="robot2"),
+    )  # fmt: skip
+    one, two = team.peers["robot1"], team.peers["robot2"]
+    seen = []
+    for time_s in (4.5, 5.5, 6.5):
+        team.time.run_until(time_s)
+        seen.append((one.runs, two.runs))
+        assert (one.incarnation, two.incarnation) == (1, 1)
+    assert seen == [(False, False), (False, True), (True, True)]
+
+
 def test_a_process_that_begins_again_remembers_its_promise_and_its_body_stands() -> None:
     _, team = team_with(Kill(at_s=6.9, for_s=2.0, who="robot1"))
     robot = team.peers["robot1"]
