@@ -27,7 +27,7 @@ def describe(status: Status, now_s: float) -> str:
     up = f"{now_s:6.1f} s  {status.up}/{len(status.peers)} up"
     if status.deployment is None:
         return f"{up}, starting"
-    chain = "chain connected" if status.chain_connected else "chain broken"
+    chain = f"{_chain(status)} {'connected' if status.chain_connected else 'broken'}"
     leads = f", {_leader(status) or 'nobody'} leads"
     sight = "" if status.chain_connected else ", agent visible" if status.agent_visible else ", agent out of sight"
     if status.agent_visible is None:
@@ -39,7 +39,9 @@ def describe(status: Status, now_s: float) -> str:
 def draw(status: Status, mission: Mission, now_s: float) -> Table:
     """The team as a table."""
     length = f" of {mission.duration_s:g} s" if mission.duration_s is not None else " s, Ctrl-C ends the run"
-    chain = Text("chain connected", "bold green") if status.chain_connected else Text("chain broken", "bold red")
+    chain = Text(f"{_chain(status)} broken", "bold red")
+    if status.chain_connected:
+        chain = Text(f"{_chain(status)} connected", "bold green")
     sight = Text("agent visible", "green") if status.agent_visible else Text("agent out of sight", "red")
     if status.agent_visible is None:
         sight = Text(f"agent {_whereabouts(status)}")
@@ -75,6 +77,11 @@ def _deployment(status: Status) -> str:
     if deployment is None:
         return "no deployment yet"
     return f"deployment {deployment.decision}: {deployment.reason}"
+
+
+def _chain(status: Status) -> str:
+    """What is known to be connected: not as far as an agent of which nobody knows whether it is in sight."""
+    return "chain to the relays" if status.agent_visible is None else "chain"
 
 
 def _leader(status: Status) -> str | None:

@@ -160,7 +160,7 @@ def test_an_independent_agent_is_where_the_ranges_say(mission: Mission) -> None:
     view.handle(said("robot1", state((1.0, 3.5)), sequence=2), 1.1)
     status = view.status(1.1)
     assert status.chain_connected
-    assert "agent within" in describe(status, 1.1)
+    assert ", chain to the relays connected, agent within" in describe(status, 1.1), "nobody knows of the agent"
     console = Console(width=120, record=True, file=io.StringIO())
     console.print(draw(status, mission, 1.1))
     assert "m² at" in console.export_text()
