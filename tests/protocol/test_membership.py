@@ -191,3 +191,28 @@ def test_two_majorities_always_share_a_voter(voters: int, majority: int) -> None
     text = roster.describe_majority()
     assert f"{majority} of {voters} voters" in text
     assert ("halves" in text) is (voters % 2 == 0)
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from((0.0, 0.1, 0.5, 1.0, 1.5, 4.0)),
+            st.sampled_from((
+                heard(), heard(), heard("robot2"), heard("agent"), heard("base"), heard("robot1", 1), heard("nobody"),
+                PeerAppeared("robot1"), PeerVanished("robot1"), PeerVanished("robot2"), Tick(),
+            )),
+        ),
+        max_size=40,
+    )
+)  # fmt: skip
+def test_noting_a_peer_in_passing_is_the_same_as_handling_what_it_says(events: list[tuple[float, Event]]) -> None:
+    """Two views of the same, one of which notes in passing all that it may."""
+    whole, passing, now_s = Membership(ROSTER, "base", 1.0), Membership(ROSTER, "base", 1.0), 0.0
+    for later_s, event in events:
+        now_s += later_s
+        effects = whole.handle(event, now_s)
+        if isinstance(event, Heard) and passing.refresh(event.peer, event.incarnation, now_s):
+            assert effects == [WakeAt(passing.due_s)]
+        else:
+            assert passing.handle(event, now_s) == effects
+        assert [passing.presence(name) for name in ROSTER.names] == [whole.presence(name) for name in ROSTER.names]
