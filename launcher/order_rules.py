@@ -95,6 +95,8 @@ class MotionRules:
         """By epoch, plan and revision: the last stage that was released before that."""
         self._progress: dict[str, tuple[int, Progress]] = {}
         """What each robot said last, and its incarnation."""
+        self._finished: dict[tuple[str, int, int], int] = {}
+        """By robot, epoch and plan: stages that it said last to have finished, whatever it has followed since."""
 
     def hear(self, peer: SimulatedPeer, envelope: Envelope) -> None:
         """Remember what is ordered; hold what robots say of themselves against it, and against where they truly are."""
@@ -144,6 +146,7 @@ class MotionRules:
         name = peer.name
         before_incarnation, before = self._progress.get(name, (-1, None))
         self._progress[name] = (incarnation, progress)
+        self._finished[name, progress.epoch, progress.plan] = progress.finished
         if before is not None and before_incarnation == incarnation and _steps(progress) < _steps(before):
             raise Violation("nobody goes back", f"{name} goes from {_steps(before)} to {_steps(progress)}")
         motion = self._motions.get((progress.epoch, progress.plan, progress.revision))
@@ -185,18 +188,11 @@ class MotionRules:
         for other in motion.ways:
             if other.member == name or not other.scheduled or other.member not in self._peers:
                 continue
-            finished = self._finished(other.member, progress)
+            finished = self._finished.get((other.member, progress.epoch, progress.plan), 0)
             behind = range(max(finished, motion.first_stage), number - 1)
             if any(other.stages[n - motion.first_stage] < other.stages[n - motion.first_stage + 1] for n in behind):
                 text = f"{name} is in stage {number}, {other.member} has finished {finished}"
                 raise Violation("nobody is two stages ahead", text)
-
-    def _finished(self, member: str, progress: Progress) -> int:
-        """Stages of this plan that a member has said to have finished."""
-        known = self._progress.get(member)
-        if known is None or (known[1].epoch, known[1].plan) != (progress.epoch, progress.plan):
-            return 0
-        return known[1].finished
 
 
 def _agree(one: Motion, other: Motion) -> bool:
