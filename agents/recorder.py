@@ -81,6 +81,9 @@ if TYPE_CHECKING:
 
 JOURNAL = "journal"
 
+REFEREE = "referee"
+"""Who judges afterwards what no peer can know; not a peer."""
+
 _LEVELS = {
     "debug": rr.TextLogLevel.DEBUG,
     "info": rr.TextLogLevel.INFO,
@@ -127,6 +130,7 @@ class RerunRecorder:
         self._bounds: tuple[float, float, float, float] | None = None
         self._roles: dict[str, str] = {}
         self._robots: list[str] = []
+        self._announces = True
         self._motion: Motion | None = None
         self._last: dict[str, Track] = {}
 
@@ -173,6 +177,7 @@ class RerunRecorder:
         """Learn who is who: any peer may come to lead, and then draws the tree of all."""
         self._roles = {entry.name: entry.role for entry in mission.roster}
         self._robots = [entry.name for entry in mission.robots]
+        self._announces = mission.announces
 
     def record(self, time_s: float, peer: str, record: AnyRecord) -> None:
         """Write a record and draw it."""
@@ -186,7 +191,7 @@ class RerunRecorder:
                 self._draw_track(now_ns, peer, record)
             case Decision():
                 self._draw_decision(now_ns, peer, record)
-            case Connectivity():
+            case Connectivity() if self._announces or peer == REFEREE:
                 self._draw_connectivity(now_ns, record)
             case Ordered():
                 self._draw_motion(now_ns, record.motion)

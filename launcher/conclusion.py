@@ -5,10 +5,12 @@ from __future__ import annotations
 from msgspec import json, structs
 
 from agents.certificate_judge import certificate_judge
+from agents.recorder import REFEREE, RerunRecorder
 from launcher.mission_trace import MissionTrace
+from launcher.referee import record_verdicts
 from launcher.report import Metrics, measure
 from launcher.review import merge, read_records
-from launcher.run_folder import RunFolder
+from launcher.run_folder import RECORDINGS, RunFolder
 from planning.environment import Environment
 
 
@@ -21,7 +23,23 @@ def conclude(folder: RunFolder) -> Metrics:
         ValueError: recordings, mission or map are absent or damaged; one sentence.
     """
     merge(folder.path)
+    _add_verdicts(folder)
     return measure_run(folder)
+
+
+def _add_verdicts(folder: RunFolder) -> None:
+    """Add to the recording who truly saw whom, if no peer could know."""
+    mission = folder.read_mission()
+    if mission.announces:
+        return
+    environment = Environment.load(folder.path / mission.map_path)
+    trace = MissionTrace.of(read_records(folder.recording), mission)
+    file = folder.path / RECORDINGS / f"{REFEREE}.rrd"
+    recorder = RerunRecorder(file, team=mission.team, recording_id=folder.path.name, peer=REFEREE)
+    recorder.know(mission)
+    record_verdicts(trace, environment, recorder)
+    recorder.close()
+    merge(folder.path)
 
 
 def measure_run(folder: RunFolder) -> Metrics:
@@ -37,11 +55,11 @@ def measure_run(folder: RunFolder) -> Metrics:
     environment = Environment.load(folder.path / mission.map_path)
     trace = MissionTrace.of(read_records(folder.recording), mission)
     metrics = measure(trace, environment)
-    judge = certificate_judge(mission, environment)
+    certify = certificate_judge(mission, environment)
     refuted = tuple(
         f"the motion ordered at {time_s:.2f} s is not certified: {fault}"
         for time_s, ordered in trace.motions
-        if (fault := judge(ordered.motion))
+        if (fault := certify(ordered.motion))
     )
     faults = trace.reigns.broken
     metrics = structs.replace(metrics, leading_faults=faults, failures=metrics.failures + refuted + faults)

@@ -134,8 +134,7 @@ def measure(trace: MissionTrace, environment: Environment) -> Metrics:
     """
     edges_s = np.append(np.arange(0.0, trace.duration_s, 1.0 / trace.control_hz), trace.duration_s)
     middles_s, lengths_s = 0.5 * (edges_s[1:] + edges_s[:-1]), np.diff(edges_s)
-    there = np.column_stack([_presence(trail, middles_s, trace.control_hz) for trail in trace.trails])
-    places = np.stack([_places(trail, middles_s) for trail in trace.trails], axis=1)
+    there, places = sample(trace, middles_s)
     judged = _judge(trace, _sights(places, there, environment))
     first_s = trace.decisions[0][0] if trace.decisions else None
     deployments = [decision.deployment for _, decision in trace.decisions]
@@ -191,6 +190,12 @@ def measure(trace: MissionTrace, environment: Environment) -> Metrics:
         warnings=sum(line.level == "warning" for _, _, line in trace.logs),
         errors=sum(line.level == "error" for _, _, line in trace.logs),
     )
+
+
+def sample(trace: MissionTrace, times_s: Floats) -> tuple[Bools, Floats]:
+    """Who was there, and where: (t, n) bool, and (t, n, 2) in metres, meaningless for who was not; trails in order."""
+    there = np.column_stack([_presence(trail, times_s, trace.control_hz) for trail in trace.trails])
+    return there, np.stack([_places(trail, times_s) for trail in trace.trails], axis=1)
 
 
 def _presence(trail: Trail, times_s: Floats, control_hz: float) -> Bools:

@@ -96,6 +96,7 @@ def _simulate(
 
     from launcher.fault_timetable import Timetable, read_timetable
     from launcher.preparation import prepare
+    from launcher.referee import record_verdicts
     from launcher.report import measure
     from launcher.report_table import render
     from launcher.simulation import UNTIL_TOLD_S
@@ -120,6 +121,8 @@ def _simulate(
                     mission, environment, recorder=recorder, duration_s=length_s, seed=seed,
                     planner=preparation.planner, faults=Timetable(faults=faults), loss=loss,
                 )  # fmt: skip
+                if recorder is not None and not mission.announces:
+                    record_verdicts(trace, environment, recorder)
             finally:
                 if recorder is not None:
                     recorder.close()
