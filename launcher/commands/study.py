@@ -128,20 +128,6 @@ def topology(
         _conclude(study_topology(folder, seeds, duration_s, tell=tell), folder)
 
 
-@app.command()
-def topology(
-    seeds: Annotated[int, typer.Option(min=1, max=1000, help="Missions of each scenario and loss.")] = 2,
-    duration_s: Annotated[float, typer.Option("--duration", min=10.0, max=3600.0, help="Of each, seconds.")] = 60.0,
-    output: Output = None,
-) -> None:
-    """Trees by the leader's optimum and by the auction of all, over the same simulated missions."""
-    with plainly():
-        folder = _made(output, "topology", "planning")
-        from launcher.studies.topology import study_topology
-
-        _conclude(study_topology(folder, seeds, duration_s, tell=tell), folder)
-
-
 def _made(output: Path | None, name: str, package: Literal["planning", "estimation"]) -> Path:
     """The folder to write to, made before any work is done for it; then the package's kernels.
 
