@@ -154,8 +154,7 @@ class Auctioneer:
         if reign is not None and warrant is not None and held.lot is not None:
             self._said += 1
             authority = Authority(epoch=reign.epoch, leader=self._name, sequence=self._said)
-            closes_in_s = max(0.0, held.closes_s - now_s)
-            self._effects.append(Publish(to_auction(held.lot, held.number, closes_in_s, authority, warrant)))
+            self._effects.append(Publish(to_auction(held.lot, held.number, authority, warrant)))
 
     def _hear(self, auction: Auction, sender: str, incarnation: int, now_s: float) -> None:
         """Look for an offer, or make the one again that has been made."""

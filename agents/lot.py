@@ -41,13 +41,12 @@ class Bids:
     """By bidder."""
 
 
-def to_auction(lot: Lot, number: int, closes_in_s: float, authority: Authority, warrant: Warrant) -> Auction:
+def to_auction(lot: Lot, number: int, authority: Authority, warrant: Warrant) -> Auction:
     """The message."""
     return Auction(
         authority=authority,
         warrant=warrant,
         auction=number,
-        closes_in_s=closes_in_s,
         center=lot.center,
         aims=tuple(
             messages.Aim(

@@ -66,7 +66,8 @@ async def listening(folder: Path, answer: Callable[[Order], Answer]) -> AsyncIte
     """Take orders on the socket in a run's folder. Raises OSError where the file system has no sockets."""
 
     async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        try:
+        # Whoever asked may be gone, or say too much; nobody is to be told then.
+        with contextlib.closing(writer), contextlib.suppress(OSError, ValueError, TimeoutError):
             line = await asyncio.wait_for(reader.readline(), ANSWER_WITHIN_S)
             try:
                 said = answer(msgspec.json.decode(line, type=Order))
@@ -74,10 +75,6 @@ async def listening(folder: Path, answer: Callable[[Order], Answer]) -> AsyncIte
                 said = Answer(done=False, text=f"not understood: {problem}")
             writer.write(msgspec.json.encode(said) + b"\n")
             await asyncio.wait_for(writer.drain(), ANSWER_WITHIN_S)
-        except (OSError, ValueError, TimeoutError):
-            pass  # whoever asked is gone, or says too much
-        finally:
-            writer.close()
 
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:

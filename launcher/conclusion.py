@@ -5,6 +5,7 @@ from __future__ import annotations
 from msgspec import json, structs
 
 from agents.certificate_judge import certificate_judge
+from agents.mission import Mission
 from agents.recorder import REFEREE, RerunRecorder
 from launcher.mission_trace import MissionTrace
 from launcher.referee import record_verdicts
@@ -23,23 +24,11 @@ def conclude(folder: RunFolder) -> Metrics:
         ValueError: recordings, mission or map are absent or damaged; one sentence.
     """
     merge(folder.path)
-    _add_verdicts(folder)
-    return measure_run(folder)
-
-
-def _add_verdicts(folder: RunFolder) -> None:
-    """Add to the recording who truly saw whom, if no peer could know."""
-    mission = folder.read_mission()
-    if mission.announces:
-        return
-    environment = Environment.load(folder.path / mission.map_path)
-    trace = MissionTrace.of(read_records(folder.recording), mission)
-    file = folder.path / RECORDINGS / f"{REFEREE}.rrd"
-    recorder = RerunRecorder(file, team=mission.team, recording_id=folder.path.name, peer=REFEREE)
-    recorder.know(mission)
-    record_verdicts(trace, environment, recorder)
-    recorder.close()
-    merge(folder.path)
+    mission, environment, trace = _read(folder)
+    if not mission.announces:
+        _add_verdicts(folder, mission, environment, trace)
+        merge(folder.path)
+    return _measure(folder, mission, environment, trace)
 
 
 def measure_run(folder: RunFolder) -> Metrics:
@@ -51,9 +40,25 @@ def measure_run(folder: RunFolder) -> Metrics:
     Raises:
         ValueError: as above.
     """
+    return _measure(folder, *_read(folder))
+
+
+def _read(folder: RunFolder) -> tuple[Mission, Environment, MissionTrace]:
     mission = folder.read_mission()
     environment = Environment.load(folder.path / mission.map_path)
-    trace = MissionTrace.of(read_records(folder.recording), mission)
+    return mission, environment, MissionTrace.of(read_records(folder.recording), mission)
+
+
+def _add_verdicts(folder: RunFolder, mission: Mission, environment: Environment, trace: MissionTrace) -> None:
+    """Add to the recordings who truly saw whom: no peer could know it."""
+    file = folder.path / RECORDINGS / f"{REFEREE}.rrd"
+    recorder = RerunRecorder(file, team=mission.team, recording_id=folder.path.name, peer=REFEREE)
+    recorder.know(mission)
+    record_verdicts(trace, environment, recorder)
+    recorder.close()
+
+
+def _measure(folder: RunFolder, mission: Mission, environment: Environment, trace: MissionTrace) -> Metrics:
     metrics = measure(trace, environment)
     certify = certificate_judge(mission, environment)
     refuted = tuple(

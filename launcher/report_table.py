@@ -77,10 +77,10 @@ def _describe_motion(metrics: Metrics) -> str:
         return "none"
     certified = metrics.certified
     plans = f"{counted(metrics.plans, 'plan')}, {counted(metrics.motions - metrics.plans, 'revision')}"
-    return (
-        f"{plans}; certified as one network {100 * certified.team:.1f} % of the time, with the agent's next moments "
-        f"{100 * certified.agent:.1f} %"
-    )
+    text = f"{plans}; certified as one network {100 * certified.team:.1f} % of the time"
+    if metrics.estimate is not None:  # nobody is told of the agent's next moments
+        return text
+    return f"{text}, with the agent's next moments {100 * certified.agent:.1f} %"
 
 
 def _describe_estimate(figures: EstimateFigures | None) -> list[tuple[str, str]]:

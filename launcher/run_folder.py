@@ -105,7 +105,7 @@ class RunFolder:
             if (path / "mission.json").is_file():
                 return cls(path)
         raise ScenarioFault(
-            f"{run or RUNS / LATEST} is no run: name a folder that holds a mission.json, or leave it out"
+            f"{run or RUNS / LATEST} is no run: name a folder that holds a mission.json, such as {RUNS / LATEST}"
         )
 
     def write(self, scenario_file: Path, mission: Mission, environment: Environment) -> None:

@@ -150,16 +150,6 @@ class Membership:
         known = self._known.get(peer)
         return known.incarnation if known is not None else -1
 
-    @property
-    def present(self) -> tuple[str, ...]:
-        """Who is there, in the order of the roster, this peer included."""
-        return tuple(peer for peer in self._roster.names if self.presence(peer) is Presence.PRESENT)
-
-    def is_outdated(self, peer: str, incarnation: int) -> bool:
-        """Whether a message is of an incarnation that has been replaced, and must not count."""
-        known = self._known.get(peer)
-        return known is not None and incarnation < known.incarnation
-
     def _learn(self, known: _Known, event: Heard | PeerAppeared | PeerVanished, now_s: float) -> list[Effect]:
         match event:
             case PeerAppeared(peer):

@@ -382,8 +382,6 @@ class Auction(Body, frozen=True, kw_only=True, tag="auction"):
     warrant: Warrant
     auction: Count
     """Number of the auction in this epoch."""
-    closes_in_s: Seconds
-    """Bids that come later are not counted."""
     center: Point
     """In the middle of where the agent is."""
     aims: Annotated[tuple[Aim, ...], msgspec.Meta(min_length=1, max_length=16)]

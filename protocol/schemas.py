@@ -198,7 +198,6 @@ EXAMPLES: Final[tuple[AnyBody, ...]] = (
         authority=Authority(epoch=3, leader="robot2", sequence=18),
         warrant=Warrant(lease_s=0.84, marks=(LastHeard(peer="base", mark="0.56"),)),
         auction=5,
-        closes_in_s=0.25,
         center=(9.0, 3.5),
         aims=(Aim(places=((9.0, 3.5), (9.0, 7.5)), shares=(0.0, 1.0), ahead_m=4.0),),
         robots=(
