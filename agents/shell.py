@@ -34,8 +34,8 @@ from agents.role import (
     Written,
 )
 from protocol.bus import Bus, BusEvent, PeerAppeared, PeerVanished, Received
-from protocol.keys import Address, parse
-from protocol.messages import Envelope, Goal, MalformedMessage, decode, encode, kind_of
+from protocol.keys import Address, parse, route
+from protocol.messages import Envelope, Goal, MalformedMessage, addressee_of, decode, encode, kind_of
 
 MAXIMUM_OPERATORS: Final = 64
 """Operators remembered at a time. Their names are not on the roster, so that the memory must be bounded."""
@@ -118,7 +118,8 @@ class PeerShell:
     def take(self, event: BusEvent) -> None:
         """Pass an event of the bus on to the role, if it is fit for it."""
         if isinstance(event, Received):
-            if event.key.rpartition("/")[2] not in self._role.hears:
+            kind, to = route(event.key)
+            if kind not in self._role.hears or to not in ("", self._name):
                 return  # most of the traffic: not worth a closer look
             verdict = self._examine(event)
             if isinstance(verdict, Heard):
@@ -162,7 +163,9 @@ class PeerShell:
             return "malformed"
         if envelope.sender != address.speaker:
             return "impersonated"
-        if envelope.kind != address.kind or isinstance(envelope.body, Goal) is not address.operator:
+        if envelope.kind != address.kind or addressee_of(envelope.body) != address.to:
+            return "misplaced"
+        if isinstance(envelope.body, Goal) is not address.operator:
             return "misplaced"
         return Heard(address, envelope) if self._is_news(address, envelope) else "stale"
 
@@ -226,7 +229,8 @@ class PeerShell:
 
     def _publish(self, envelope: Envelope) -> None:
         self._sequence += 1
-        self._bus.publish(Address(self._team, self._name, kind_of(envelope.body)).key, encode(envelope))
+        address = Address(self._team, self._name, kind_of(envelope.body), to=addressee_of(envelope.body))
+        self._bus.publish(address.key, encode(envelope))
 
     def _complain(self, level: Literal["warning", "error"], what: tuple[str, str], text: str) -> None:
         if what not in self._complained:

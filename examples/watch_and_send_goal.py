@@ -58,7 +58,9 @@ def main() -> int:
                     sample = said.get(timeout=rest)
                 except queue.Empty:
                     break
-                *_, speaker, kind = str(sample.key_expr).split("/")
+                _, _, speaker, kind, *more = str(sample.key_expr).split("/")
+                if more:
+                    continue  # from an operator, or for one peer only
                 if kind == "alive":
                     (peers.add if sample.kind == zenoh.SampleKind.PUT else peers.discard)(speaker)
                     continue

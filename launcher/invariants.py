@@ -23,6 +23,7 @@ from launcher.simulated_peer import SimulatedPeer, decode_shared, holds_lease
 from launcher.simulation import SimulatedTeam
 from launcher.tree_rules import TreeRules
 from launcher.violation import Violation
+from protocol.keys import route
 from protocol.messages import Envelope, Reign
 
 LOOK_S: Final = 1.0
@@ -73,7 +74,7 @@ class Invariants:
 
     def _hear(self, peer: SimulatedPeer, key: str, payload: bytes) -> None:
         """Called in the middle of an event, where whatever is raised would count as a failure of the role."""
-        if key.rpartition("/")[2] in JUDGED_KINDS and self._found is None:
+        if route(key)[0] in JUDGED_KINDS and self._found is None:
             envelope = decode_shared(payload)
             try:
                 for rules in self._rules:

@@ -14,6 +14,7 @@ from contextlib import suppress
 from typing import Generic, TypeVar
 
 from protocol.bus import BusEvent, Received
+from protocol.keys import route
 from protocol.messages import PERIODIC_KINDS
 
 PER_KEY = 64
@@ -75,7 +76,7 @@ class Inbox(Generic[Local]):
                 self.dropped += 1
                 return False
             tickets = self._tickets[key] = deque()
-        periodic = key.rpartition("/")[2] in PERIODIC_KINDS
+        periodic = route(key)[0] in PERIODIC_KINDS
         if len(tickets) >= (1 if periodic else PER_KEY):
             del self._waiting[tickets.popleft()]
             self.dropped += not periodic

@@ -611,8 +611,13 @@ class MalformedMessage(ValueError):
 
 
 def kind_of(body: Body) -> str:
-    """Tag of a body, which is the last chunk of its key."""
+    """Tag of a body, which is the kind in its key."""
     return str(body.__struct_config__.tag)
+
+
+def addressee_of(body: Body) -> str:
+    """The peer that a body is for, which its key names behind the kind; empty: all."""
+    return body.candidate if isinstance(body, Vote) else ""
 
 
 _encoder = msgspec.json.Encoder()

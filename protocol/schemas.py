@@ -73,7 +73,7 @@ SPEAKERS: Final = {
     "goal_reply": ("tracked agent", "for each goal heard"),
     "deployment": ("the leader", "with every decision, and again while it holds"),
     "vote_request": ("who stands for leader, and the leader", "eight times in a lease"),
-    "vote": ("every peer", "for each vote request heard"),
+    "vote": ("every peer, to who asked", "for each vote request heard"),
     "topology": ("the leader", "four times a second, and with every change"),
     "confirmation": (
         "base station, robots",
@@ -269,9 +269,10 @@ relay, so connect to the endpoint of each one that you want to hear: `runs/<name
 
 {keys}
 
-`<team>`, `<peer>` and `<name>` are up to 32 lower-case letters, digits and `_`, a letter first; no peer is called
-`{operator}`. A message counts only if its `sender` is the one that its key names. A kind that is *latest only* says all
-that the ones before said: who is slow may skip to the last one. The rates are in the mission file.
+`<team>`, `<peer>`, `<to>` and `<name>` are up to 32 lower-case letters, digits and `_`, a letter first; no peer is
+called `{operator}`. A message counts only if its `sender` is the one that its key names. What is said under a key that
+ends in `<to>` is for that peer; `<team>/{version}/**` brings you these too. A kind that is *latest only* says all that
+the ones before said: who is slow may skip to the last one. The rates are in the mission file.
 
 ## Envelope
 
@@ -407,7 +408,7 @@ def _page() -> str:
 def _key(kind: str) -> str:
     if BODIES[kind] is Goal:
         return keys.Address("<team>", "<name>", kind, operator=True).key
-    return keys.Address("<team>", "<peer>", kind).key
+    return keys.Address("<team>", "<peer>", kind, to="<to>" if kind in keys.ADDRESSED_KINDS else "").key
 
 
 def _field_table(struct: type[msgspec.Struct]) -> str:

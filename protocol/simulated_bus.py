@@ -19,6 +19,7 @@ from heapq import heappop, heappush
 from typing import Any
 
 from protocol.bus import BusEvent, Deliver, PeerAppeared, PeerVanished, Received
+from protocol.keys import route
 from protocol.simulated_links import SOUND, Delays, Link, LinkFaults
 
 
@@ -136,8 +137,8 @@ class SimulatedNetwork:
         self._attachments = 0
         self._attached: dict[str, SimulatedBus] = {}
         self._links: dict[tuple[str, str], Link] = {}
-        self._routes: dict[tuple[str, str], list[tuple[Link, SimulatedBus]]] = {}
-        """By speaker and kind; of those that are attached now."""
+        self._routes: dict[tuple[str, str, str], list[tuple[Link, SimulatedBus]]] = {}
+        """By speaker, kind and addressee; of those that are attached now."""
 
     def attach(
         self, peer: str, deliver: Deliver, *, operator: bool = False, kinds: Collection[str] | None = None
@@ -148,7 +149,7 @@ class SimulatedNetwork:
             peer: its name.
             deliver: takes what arrives.
             operator: whether it is an operator and no peer.
-            kinds: kinds of messages (last chunks of keys) that it listens to; None: all.
+            kinds: kinds of messages that it listens to; None: all. What is for one peer reaches it, and operators.
 
         Raises:
             ValueError: somebody of that name is attached already.
@@ -213,13 +214,15 @@ class SimulatedNetwork:
 
     def _publish(self, sender: SimulatedBus, publication: Received) -> None:
         self.published += 1
-        kind = publication.key.rpartition("/")[2]
-        routes = self._routes.get((sender.peer, kind))
+        kind, to = route(publication.key)
+        routes = self._routes.get((sender.peer, kind, to))
         if routes is None:
-            routes = self._routes[sender.peer, kind] = [
+            routes = self._routes[sender.peer, kind, to] = [
                 (self._link(sender.peer, other.peer), other)
                 for other in self._attached.values()
-                if other is not sender and (other.kinds is None or kind in other.kinds)
+                if other is not sender
+                and (other.kinds is None or kind in other.kinds)
+                and (not to or other.operator or other.peer == to)
             ]
         now_s, call_at = self._time.now_s, self._time.call_at
         for link, other in routes:

@@ -22,6 +22,7 @@ from launcher.scenario import find_scenario
 from launcher.simulated_peer import SimulatedPeer
 from launcher.simulation import SimulatedTeam
 from launcher.studies import drawing
+from protocol.keys import route
 from protocol.messages import Method
 
 if TYPE_CHECKING:
@@ -124,7 +125,7 @@ def live_through(
     sizes: Counter[str] = Counter()
 
     def count(_peer: SimulatedPeer, key: str, payload: bytes) -> None:
-        kind = key.rpartition("/")[2]
+        kind, _ = route(key)
         said[kind] += 1
         sizes[kind] += len(payload)
 

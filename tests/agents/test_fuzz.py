@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from agents.casting import Casting
 from protocol.bus import Received
-from protocol.keys import Address
+from protocol.keys import ADDRESSED_KINDS, Address
 from protocol.messages import BODIES
 from protocol.schemas import example_payloads
 from tests.campaigns.arbitrary_messages import BAD_KEYS
@@ -27,7 +27,9 @@ def castings() -> tuple[Casting, ...]:
 def keys(draw: st.DrawFn) -> str:
     if draw(st.booleans()):
         return draw(st.sampled_from(BAD_KEYS) | st.text(max_size=40))
-    return Address("team", draw(st.sampled_from(NAMES)), draw(st.sampled_from([*BODIES, "alive"]))).key
+    kind = draw(st.sampled_from([*BODIES, "alive"]))
+    to = draw(st.sampled_from(["", *NAMES])) if kind in ADDRESSED_KINDS else ""
+    return Address("team", draw(st.sampled_from(NAMES)), kind, to=to).key
 
 
 @st.composite

@@ -27,7 +27,7 @@ from agents.role import (
 )
 from agents.shell import MAXIMUM_OPERATORS, PeerShell
 from protocol.bus import PeerAppeared, PeerVanished, Received
-from protocol.messages import AnyBody, Envelope, Goal, Heartbeat, Point, State, decode, encode
+from protocol.messages import AnyBody, Envelope, Goal, Heartbeat, Point, State, Vote, decode, encode
 
 HEARTBEAT = Heartbeat(role="base_station", mode="waiting")
 
@@ -48,7 +48,7 @@ class Wire:
 class Puppet:
     """Does what it is told, remembers what it was told."""
 
-    hears = frozenset({"heartbeat", "goal", "state"})
+    hears = frozenset({"heartbeat", "goal", "state", "vote"})
 
     def __init__(self) -> None:
         self.events: list[Event] = []
@@ -93,6 +93,7 @@ class Stage:
 
 
 GOAL = Goal(goal=(1.0, 1.0), correlation="one")
+VOTE_FOR_AGENT = Vote(candidate="agent", correlation="0.1", granted=True, mark="0.1")
 
 
 @pytest.fixture
@@ -121,6 +122,11 @@ def test_hears_each_kind_of_each_sender_in_rising_order(stage: Stage) -> None:
         ("team/v1/base/goal", "base", GOAL, "misplaced"),
         ("team/v1/operator/anna/heartbeat", "anna", None, "misplaced"),
         ("team/v1/operator/anna/goal", "base", GOAL, "impersonated"),
+        ("team/v1/base/heartbeat/robot1", "base", None, ""),
+        ("team/v1/base/vote/robot1", "base", None, "misplaced"),
+        ("team/v1/base/vote/robot1", "base", VOTE_FOR_AGENT, "misplaced"),
+        ("team/v1/base/vote", "base", VOTE_FOR_AGENT, "misplaced"),
+        ("team/v1/base/vote/agent", "base", VOTE_FOR_AGENT, ""),
         ("team/v1/robot1/heartbeat", "robot1", None, ""),
         ("team/v1/base/deployment", "agent", None, ""),
     ],
@@ -131,6 +137,15 @@ def test_refuses_what_does_not_fit_its_key(
     stage.take(1, key, sender, body=body or HEARTBEAT)
     assert not stage.heard
     assert dict(stage.shell.refused) == ({reason: 1} if reason else {})
+
+
+def test_votes_are_said_to_their_candidate_and_heard_by_it_only(stage: Stage) -> None:
+    vote = Vote(candidate="robot1", correlation="0.1", granted=True, mark="0.1")
+    stage.take(1, "team/v1/base/vote/robot1", body=vote)
+    assert [envelope.body for envelope in stage.heard] == [vote]
+    stage.role.effects = (Publish(VOTE_FOR_AGENT),)
+    stage.shell.wake()
+    assert [key for key, _ in stage.wire.sent] == ["team/v1/robot1/vote/agent"]
 
 
 def test_operators_speak_without_being_on_the_roster(stage: Stage) -> None:

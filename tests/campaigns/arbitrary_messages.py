@@ -18,7 +18,7 @@ from msgspec import inspect as types
 from msgspec import structs
 
 from protocol.bus import BusEvent, PeerAppeared, PeerVanished, Received
-from protocol.keys import Address
+from protocol.keys import ADDRESSED_KINDS, Address
 from protocol.messages import (
     BODIES,
     MAXIMUM_PAYLOAD_BYTES,
@@ -33,6 +33,7 @@ from protocol.messages import (
     Vote,
     VoteRequest,
     Warrant,
+    addressee_of,
     encode,
     kind_of,
 )
@@ -76,10 +77,10 @@ class Mischief:
         self._elects = self.chance.random() < 0.5
         """Whether it would have the hearer lead, and says nothing that keeps it from that; else somebody else."""
         self._kinds = tuple(sorted({*kinds} - {"vote_request"} if self._elects and len(kinds) > 3 else kinds))
-        self._examples = tuple(body for body in EXAMPLES if kind_of(body) in self._kinds)
+        self._hearer = hearer
+        self._examples = tuple(self._direct(body) for body in EXAMPLES if kind_of(body) in self._kinds)
         self._incarnations = dict.fromkeys((*names, OPERATOR), 0)
         self._sequence = 0
-        self._hearer = hearer
         self._request: VoteRequest | None = None
         """The last one of the hearer."""
         self._mark = "x"
@@ -166,7 +167,8 @@ class Mischief:
             sent_at_s=float(self._sequence),
             body=body,
         )
-        return Received(Address(self._team, name, kind_of(body), operator=operator).key, encode(envelope))
+        address = Address(self._team, name, kind_of(body), operator=operator, to=addressee_of(body))
+        return Received(address.key, encode(envelope))
 
     def _misplace(self, body: AnyBody) -> Received:
         """Under a key that is not its own, or old."""
@@ -180,7 +182,8 @@ class Mischief:
         if self.chance.random() < 0.3:
             return self.chance.choice(BAD_KEYS)
         name, kind = self.chance.choice(self._names), self.chance.choice((*BODIES, "alive"))
-        return Address(self._team, name, kind, operator=self.chance.random() < 0.1).key
+        to = self.chance.choice(("", "nobody", self._hearer)) if kind in ADDRESSED_KINDS else ""
+        return Address(self._team, name, kind, operator=self.chance.random() < 0.1, to=to).key
 
     def _mutate(self, event: Received) -> Received:
         """Some bytes changed, cut out or doubled."""
@@ -225,7 +228,13 @@ class Mischief:
         """A valid body of any kind, with any content that its types allow."""
         kind = self.chance.choice(self._kinds)
         body: AnyBody = msgspec.convert(self._value(SHAPES[kind]), BODIES[kind])  # type: ignore[assignment]
-        return self._mend(body) if isinstance(body, Auction) and self.chance.random() < 0.8 else body
+        if self.chance.random() < 0.2:
+            return body
+        return self._mend(body) if isinstance(body, Auction) else self._direct(body)
+
+    def _direct(self, body: AnyBody) -> AnyBody:
+        """For the hearer, if it is for one peer."""
+        return structs.replace(body, candidate=self._hearer) if isinstance(body, Vote) else body
 
     def _mend(self, auction: Auction) -> Auction:
         """An auction that is bid in: each place of an aim counts as much, and the chain is of robots in it."""

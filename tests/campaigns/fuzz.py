@@ -27,7 +27,7 @@ from agents.shell import MAXIMUM_OPERATORS, PeerShell
 from planning.environment import Environment
 from protocol.bus import BusEvent, Received
 from protocol.keys import Address
-from protocol.messages import Method, Point, decode, kind_of
+from protocol.messages import Method, Point, addressee_of, decode, kind_of
 from tests.campaigns.arbitrary_messages import Mischief
 
 NAMES: Final = ("base", "agent", "robot1", "robot2")
@@ -122,7 +122,7 @@ class Life:
     def publish(self, key: str, payload: bytes) -> None:
         """Of the bus: what the peer says is well-formed, whatever it was told."""
         envelope = decode(payload)
-        assert key == Address("team", self.name, envelope.kind).key
+        assert key == Address("team", self.name, envelope.kind, to=addressee_of(envelope.body)).key
         self.published += 1
         self.mischief.overhear(envelope)
 

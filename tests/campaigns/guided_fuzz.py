@@ -18,7 +18,7 @@ import atheris
 
 with atheris.instrument_imports(include=["agents", "protocol"]):
     from protocol.bus import Received
-    from protocol.keys import Address
+    from protocol.keys import ADDRESSED_KINDS, Address
     from protocol.messages import BODIES, decode
     from protocol.schemas import example_payloads
     from tests.campaigns.fuzz import LIFE, NAMES, Life, make_castings
@@ -44,7 +44,8 @@ def main() -> None:
             lives[peer] = Life(*peers[peer], given)
         kind = KINDS[data[0] % len(KINDS)] if data else KINDS[0]
         speaker = NAMES[data[1] % len(NAMES)] if len(data) > 1 else NAMES[0]
-        lives[peer].give(Received(Address("team", speaker, kind, operator=kind == "goal").key, data[2:]))
+        to = peers[peer][1] if kind in ADDRESSED_KINDS else ""
+        lives[peer].give(Received(Address("team", speaker, kind, operator=kind == "goal", to=to).key, data[2:]))
         if lives[peer].shell.traceback:
             raise AssertionError(f"{peers[peer][1]} failed:\n{lives[peer].shell.traceback}")
 

@@ -246,6 +246,30 @@ def test_a_peer_hears_the_kinds_that_it_listens_to_and_who_comes_and_goes() -> N
     assert network.delivered == 1
 
 
+def test_what_is_for_one_peer_reaches_it_and_the_operators_that_listen() -> None:
+    time = VirtualTime()
+    network = SimulatedNetwork(time, 0)
+    heard: dict[str, list[BusEvent]] = {name: [] for name in ("a", "b", "deaf", "ada", "anna")}
+    network.attach("a", heard["a"].append)
+    network.attach("b", heard["b"].append, kinds={"vote"})
+    network.attach("deaf", heard["deaf"].append, kinds={"state"})
+    network.attach("ada", heard["ada"].append, operator=True)
+    network.attach("anna", heard["anna"].append, operator=True, kinds={"state"})
+    speaker = network.attach("c", print)
+    for to in ("a", "b", "deaf", "c", "nobody"):
+        speaker.publish(f"t/v1/c/vote/{to}", b"{}")
+    time.run_until(1.0)
+    votes = {name: [event.key for event in events if isinstance(event, Received)] for name, events in heard.items()}
+    assert votes == {
+        "a": ["t/v1/c/vote/a"],
+        "b": ["t/v1/c/vote/b"],
+        "deaf": [],
+        "ada": [f"t/v1/c/vote/{to}" for to in ("a", "b", "deaf", "c", "nobody")],
+        "anna": [],
+    }
+    assert network.delivered == 7
+
+
 def test_impossible_networks_are_refused() -> None:
     time = VirtualTime()
     for delay_s in ((-1.0, 1.0), (2.0, 1.0), (0.0, math.inf), (math.nan, 1.0)):
