@@ -1,4 +1,4 @@
-"""How people let faults happen in a running team: keys on its terminal, and ``sightline fault`` from another one.
+"""How people let faults happen in a running team, and mend them: keys on its terminal, ``sightline fault`` elsewhere.
 
 The launcher listens on a socket in the run's folder (:mod:`launcher.fault_order`) for as long as the team runs.
 """
@@ -21,6 +21,7 @@ import msgspec
 from launcher.chaos import Chaos, LiveFault
 from launcher.fault_order import ANSWER_WITHIN_S, CONTROL, MOST_BYTES, Answer, Order, check_order, shortened
 from launcher.fault_timetable import LEADER, Cut, Kill, Partition, Pause
+from launcher.replacement import Replacements
 from launcher.scenario import ScenarioFault
 
 PAUSE_S: Final = 3.0
@@ -30,7 +31,7 @@ KEYS_FOR_S: Final = 5.0
 """How long what a key brings about lasts; a pause less, see above."""
 
 
-def obey(order: Order, chaos: Chaos, names: Sequence[str]) -> Answer:
+def obey(order: Order, chaos: Chaos, replacements: Replacements, names: Sequence[str]) -> Answer:
     """Do what somebody wants."""
     try:
         check_order(order, names)
@@ -43,6 +44,9 @@ def obey(order: Order, chaos: Chaos, names: Sequence[str]) -> Answer:
     if order.action == "heal":
         healed = chaos.heal(who[0] if who else None)
         return Answer(done=True, text=f"{healed} faults of links ended" if healed != 1 else "1 fault of links ended")
+    if order.action == "start":
+        obstacle = replacements.start(who[0], order.at)
+        return Answer(done=not obstacle, text=obstacle or f"{who[0]} is started")
     faults: dict[str, Callable[[], tuple[LiveFault, ...]]] = {
         "kill": lambda: (Kill(at_s=0.0, for_s=order.for_s, who=who[0]),),
         "pause": lambda: (Pause(at_s=0.0, for_s=order.for_s or PAUSE_S, who=who[0]),),

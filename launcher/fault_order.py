@@ -1,6 +1,7 @@
-"""An order that something go wrong in a running team, and how it comes to the launcher: a socket in the run's folder.
+"""An order that something go wrong in a running team, or right again: how it comes to the launcher.
 
-There is one order to a connection, and one sentence in reply. Who may write in the folder may give orders.
+By a socket in the run's folder, one order to a connection, and one sentence in reply. Who may write in the folder may
+give orders.
 """
 
 from __future__ import annotations
@@ -19,8 +20,9 @@ from agents.mission import Mission
 from launcher.fault_timetable import LEADER
 from launcher.run_folder import RunFolder
 from launcher.scenario import ScenarioFault
+from protocol.messages import Point
 
-Action: TypeAlias = Literal["kill", "pause", "cut", "heal"]
+Action: TypeAlias = Literal["kill", "pause", "cut", "heal", "start"]
 
 CONTROL: Final = "control"
 """Name of the socket in the folder of a run."""
@@ -30,12 +32,14 @@ ANSWER_WITHIN_S: Final = 5.0
 
 
 class Order(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What somebody wants to go wrong."""
+    """What somebody wants to go wrong, or right again."""
 
     action: Action
     who: tuple[str, ...] = ()
     """Names on the roster, or ``leader``."""
     for_s: float | None = None
+    at: Point | None = None
+    """Of a robot that is started: where its body is, if that is another one than before; metres."""
 
 
 class Answer(msgspec.Struct, frozen=True, kw_only=True):
@@ -49,22 +53,28 @@ def check_order(order: Order, names: Sequence[str]) -> None:
     """Hold an order against the roster.
 
     Raises:
-        ScenarioFault: it names somebody who is not there, or not as many peers as it must.
+        ScenarioFault: it names somebody who is not there, not as many peers as it must, or what it does not know.
     """
+    known = [*names] if order.action == "start" else [*names, LEADER]
     for name in order.who:
-        if name not in names and name != LEADER:
-            near = difflib.get_close_matches(name, [*names, LEADER], n=1, cutoff=0.5)
-            hint = f"did you mean {near[0]}" if near else f"choose one of {', '.join([*names, LEADER])}"
+        if name not in known:
+            near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+            hint = f"did you mean {near[0]}" if near else f"choose one of {', '.join(known)}"
             raise ScenarioFault(f"no peer is called {name}: {hint}")
-    most = {"kill": 1, "pause": 1, "cut": 2, "heal": 1}[order.action]
+    most = 2 if order.action == "cut" else 1
     if len(order.who) > most or (not order.who and order.action != "heal"):
         wanted = {
             "cut": "one peer to cut off, or two that are to be cut off from each other",
             "heal": "one peer at most",
+            "start": "one peer",
         }
         raise ScenarioFault(f"{order.action}: name {wanted.get(order.action, 'one peer, or leader')}")
     if len({*order.who}) < len(order.who):
         raise ScenarioFault(f"cut: {order.who[0]} cannot be cut off from itself; name two peers")
+    if order.for_s is not None and order.action in ("heal", "start"):
+        raise ScenarioFault(f"{order.action}: that lasts, and --for does not go with it; leave it out")
+    if order.at is not None and order.action != "start":
+        raise ScenarioFault(f"{order.action}: that puts nobody anywhere, and --at does not go with it; leave it out")
 
 
 def give_order(run: RunFolder, mission: Mission, order: Order) -> str:

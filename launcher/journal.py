@@ -41,6 +41,10 @@ class Journal:
         """A process ended that nobody wanted to end."""
         self.note(Mishap(kind="crash", who=(peer,), text=text))
 
+    def revived(self, peer: str) -> None:
+        """A peer that had been killed on purpose, or given up, has a process again."""
+        self.note(Mishap(kind="kill", who=(peer,), text=f"{peer} is started again", over=True))
+
     def note(self, mishap: Mishap) -> None:
         """Say and record what befell the team."""
         now_s = time.time() - self._mission.epoch_unix_s

@@ -28,11 +28,14 @@ from launcher import status as display
 from launcher.chaos import Chaos, LiveFault, check_live
 from launcher.chaos_control import KEYS, hearing_keys, listening, obey, order_of_key
 from launcher.console import busy, tell
+from launcher.fault_order import Answer, Order
 from launcher.fault_timetable import FaultyTimetable, Timetable, describe, read_timetable
+from launcher.ground import Ground
 from launcher.journal import OBSERVER, Journal
 from launcher.observer import Status, TeamView
 from launcher.preparation import Preparation, prepare
 from launcher.processes import age_s
+from launcher.replacement import Replacements
 from launcher.run_folder import RunFolder
 from launcher.scenario import ScenarioFault
 from launcher.supervisor import Supervisor
@@ -109,11 +112,14 @@ def run(
     links = LinkTable(folder.path / LINKS, names, create=True)
     view = TeamView(mission, preparation.environment, _listener(preparation, mission))
     journal = Journal(mission, folder.path, console)
-    supervisor = Supervisor(mission, folder.path, preparation.planner, journal.tell, journal.crashed, bodies.get)
+    supervisor = Supervisor(
+        mission, folder.path, preparation.planner, journal.tell, journal.crashed, bodies.get, journal.revived
+    )
     stop = asyncio.Event()
     _launch(supervisor, stop)
     tell("Processes: " + ", ".join(f"{peer.name} {peer.pid}" for peer in supervisor.peers.values()), console)
-    team = Team(mission, view, supervisor, links, journal)
+    ground = Ground(folder.path / mission.map_path, preparation.environment)
+    team = Team(mission, view, supervisor, links, journal, Replacements(mission, ground, supervisor, bodies.get))
     try:
         asyncio.run(_accompany(team, faults, course, stop, console))
     finally:
@@ -130,6 +136,7 @@ class Team:
     supervisor: Supervisor
     links: LinkTable
     journal: Journal
+    replacements: Replacements
 
 
 def _listener(preparation: Preparation, mission: Mission) -> SharedEstimate | None:
@@ -215,7 +222,7 @@ async def _accompany(
         )
         chaos.play(faults)
         async with contextlib.AsyncExitStack() as stack:
-            await _take_orders(stack, chaos, mission, course.folder.path, console)
+            await _take_orders(stack, chaos, team, course.folder.path, console)
             show = stack.enter_context(_shown(mission, console))
             while not stop.is_set():
                 now_s = mission_time()
@@ -244,18 +251,21 @@ async def _accompany(
 
 
 async def _take_orders(
-    stack: contextlib.AsyncExitStack, chaos: Chaos, mission: Mission, folder: Path, console: Console
+    stack: contextlib.AsyncExitStack, chaos: Chaos, team: Team, folder: Path, console: Console
 ) -> None:
     """Let people have faults happen, with ``sightline fault`` and with keys, until the stack is closed."""
-    names, robots = [entry.name for entry in mission.roster], [entry.name for entry in mission.robots]
+    names, robots = [entry.name for entry in team.mission.roster], [entry.name for entry in team.mission.robots]
+
+    def carry_out(order: Order) -> Answer:
+        return obey(order, chaos, team.replacements, names)
 
     def press(key: str) -> None:
         order = order_of_key(key, robots)
-        if order is not None and not (answer := obey(order, chaos, names)).done:
+        if order is not None and not (answer := carry_out(order)).done:
             tell(answer.text[:1].upper() + answer.text[1:], console)
 
     try:
-        await stack.enter_async_context(listening(folder, lambda order: obey(order, chaos, names)))
+        await stack.enter_async_context(listening(folder, carry_out))
     except OSError as problem:
         tell(f"Warning: `sightline fault` will not reach this run: {problem.strerror}", console, "yellow")
     if console.is_terminal and stack.enter_context(hearing_keys(press)):

@@ -5,6 +5,7 @@ peer asks the kernel to be killed when its launcher dies (``PR_SET_PDEATHSIG``),
 behind, not even a peer that is paused.
 
 Peers can also be killed and paused on purpose (:mod:`launcher.chaos`). That is no crash, and nobody is given up for it.
+Whoever is gone, for whatever reason, can be started again (:mod:`launcher.replacement`).
 """
 
 from __future__ import annotations
@@ -51,6 +52,10 @@ class Peer:
     given_up: bool = False
     killed: Killed | None = None
     """What its process was killed for, until it is back."""
+    place: Point | None = None
+    """Where the body of its next process is, if that is another one than the last had."""
+    due: asyncio.Event = field(default_factory=asyncio.Event)
+    """Set when nothing is to be waited for any more before its next process, or the end."""
 
     @property
     def gone(self) -> bool:
@@ -78,6 +83,7 @@ class Supervisor:
         announce: is told in a sentence what else becomes of peers.
         crashed: is told who crashed, and in a sentence what follows.
         find: where the body of a peer is; a mind that is restarted finds its body there.
+        revived: is told who has a process again after it had been killed on purpose, or given up.
     """
 
     def __init__(
@@ -88,6 +94,7 @@ class Supervisor:
         announce: Callable[[str], None],
         crashed: Callable[[str, str], None],
         find: Callable[[str], Point | None],
+        revived: Callable[[str], None],
     ) -> None:
         self.peers = {entry.name: Peer(entry.name) for entry in mission.roster}
         self._folder = folder
@@ -95,7 +102,8 @@ class Supervisor:
         self._announce = announce
         self._crashed = crashed
         self._find = find
-        self._stopping = asyncio.Event()
+        self._revived = revived
+        self._stopping = False
         self._watchers: list[asyncio.Task[None]] = []
         self._paused: dict[str, asyncio.TimerHandle] = {}
         self._forks: ForkServer | None = None
@@ -128,6 +136,21 @@ class Supervisor:
         os.kill(peer.pid, signal.SIGKILL)
         return True
 
+    def start(self, name: str, place: Point | None = None) -> bool:
+        """Start another process for a peer that has none, whatever became of the last one; False if it has one.
+
+        Args:
+            name: of the peer.
+            place: where the body of the new one is; where that of the last one was if None.
+        """
+        peer = self.peers[name]
+        if peer.pid is not None:
+            return False
+        peer.place = place
+        peer.crashes.clear()
+        peer.due.set()
+        return True
+
     def pause(self, name: str, for_s: float) -> bool:
         """Let a peer's process stand still; False if it has none, or stands still already. Needs the event loop."""
         pid = self.peers[name].pid
@@ -147,7 +170,9 @@ class Supervisor:
 
     async def stop(self) -> None:
         """Ask every process to end, kill what still runs after :data:`TERMINATE_S`, wait until all are gone."""
-        self._stopping.set()
+        self._stopping = True
+        for peer in self.peers.values():
+            peer.due.set()
         for name in tuple(self._paused):
             self.resume(name)
         self._signal(signal.SIGTERM)
@@ -162,7 +187,7 @@ class Supervisor:
 
     def start_process(self, peer: Peer) -> int:
         """Start a process for a peer's present incarnation and return its id."""
-        position = self._find(peer.name) if peer.incarnation else None
+        position = (peer.place or self._find(peer.name)) if peer.incarnation else None
         arguments = [
             *(str(self._folder / "mission.json"), peer.name),
             *("--incarnation", str(peer.incarnation), "--launcher", str(os.getpid())),
@@ -190,29 +215,32 @@ class Supervisor:
                     os.kill(peer.pid, number)
 
     async def _watch(self, peer: Peer) -> None:
-        """Restart a peer when it crashes, until the team stops or the peer is given up."""
+        """Restart a peer whenever it has ended, at once or later, until the team stops."""
         while peer.pid is not None:
             status = await wait_for_end(peer.pid)
             peer.pid = None
-            if self._stopping.is_set():
+            if self._stopping:
                 return
+            peer.due.clear()
             if (timer := self._paused.pop(peer.name, None)) is not None:
                 timer.cancel()
             if peer.killed is not None and peer.killed.lose_disk:
                 VoterFile(self._folder, peer.name).path.unlink(missing_ok=True)
             pause_s = self._judge_crash(peer, status) if peer.killed is None else peer.killed.back_after_s
-            if pause_s is None:
-                return
             with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(self._stopping.wait(), pause_s)
-            if self._stopping.is_set():
+                await asyncio.wait_for(peer.due.wait(), pause_s)
+            if self._stopping:
                 return
+            revived = peer.killed is not None or peer.given_up
             peer.incarnation += 1
-            peer.killed = None
+            peer.killed, peer.given_up = None, False
             peer.pid = self.start_process(peer)
+            peer.place = None
+            if revived:
+                self._revived(peer.name)
 
     def _judge_crash(self, peer: Peer, status: int) -> float | None:
-        """Note a crash and say so; how long to wait before a restart, None if there is to be none."""
+        """Note a crash and say so; how long to wait before a restart, None if nobody but :meth:`start` restarts it."""
         peer.crashes = [when for when in peer.crashes if monotonic() - when < STEADY_S] + [monotonic()]
         how = f"was killed by {signal.Signals(-status).name}" if status < 0 else f"ended with status {status}"
         if status == WOULD_JOIN_WRONGLY:

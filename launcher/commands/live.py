@@ -62,27 +62,34 @@ def goal(
 def fault(
     run: Annotated[str, typer.Argument(metavar="RUN", help="Folder or name of a run, or latest.")],
     action: Annotated[
-        Literal["kill", "pause", "cut", "heal"], typer.Argument(metavar="ACTION", help="kill, pause, cut or heal.")
+        Literal["kill", "pause", "cut", "heal", "start"],
+        typer.Argument(metavar="ACTION", help="kill, pause, cut, heal or start."),
     ],
     who: Annotated[
         list[str] | None,
         typer.Argument(
             metavar="[PEER]...",
-            help="A name on the roster, or leader; cut: one to cut off, or two; heal: all if none is named.",
+            help="A name on the roster, or leader; cut: one to cut off, or two; heal: all if none is named; "
+            "start: one that has been killed for good, or given up.",
         ),
     ] = None,
     for_s: Annotated[
         float | None, typer.Option("--for", help="Seconds; else killed and cut for good, paused for 3 s.")
     ] = None,
+    at: Annotated[
+        str | None,
+        typer.Option(metavar="X,Y", help="start: another robot of that name begins here; else where the last ended."),
+    ] = None,
 ) -> None:
-    """Have something go wrong in a running team: kill or pause a peer's process, cut its links, or heal them."""
+    """Have something go wrong in a running team: kill or pause a peer, cut links; or heal them, start a peer again."""
     from launcher.fault_order import Order, give_order
     from launcher.run_folder import RunFolder
 
     with plainly():
         check_option("--for", for_s, 0.05, LONGEST_S, "seconds")
         folder = RunFolder.find(run)
-        order = Order(action=action, who=tuple(who or ()), for_s=for_s)
+        place = None if at is None else read_point(at, "--at")
+        order = Order(action=action, who=tuple(who or ()), for_s=for_s, at=place)
         tell(give_order(folder, folder.read_mission(), order) + ".")
 
 

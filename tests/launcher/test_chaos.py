@@ -28,10 +28,14 @@ from launcher.fault_timetable import (
     Pause,
     Timetable,
 )
+from launcher.ground import Ground
+from launcher.replacement import Replacements
 from launcher.run_folder import RunFolder
 from launcher.scenario import ScenarioFault
 from launcher.supervisor import Supervisor
+from planning.environment import Environment
 from protocol.link_faults import CUT, LinkTable
+from protocol.messages import Point
 
 NAMES = ("base", "agent", "robot1", "robot2")
 
@@ -42,6 +46,10 @@ class Stand:
     def __init__(self) -> None:
         self.done: list[tuple[object, ...]] = []
         self.down: set[str] = set()
+
+    def start(self, name: str, place: Point | None) -> bool:
+        self.done.append(("start", name, place))
+        return name in self.down
 
     def kill(self, name: str, back_after_s: float | None, *, lose_disk: bool = False) -> bool:
         self.done.append(("kill", name, back_after_s, lose_disk))
@@ -62,6 +70,9 @@ class Rig:
         self.leader: str | None = "base"
         self.now_s = 0.0
         supervisor = cast(Supervisor, self.stand)
+        self.places = {"agent": (4.0, 1.0), "robot1": (1.0, 4.0)}
+        ground = Ground(folder / "map.json", Environment([(0, 0), (6, 0), (6, 6), (0, 6)]))
+        self.replacements = Replacements(mission, ground, supervisor, self.places.get)
         self.chaos = Chaos(mission, supervisor, self.links, lambda: self.leader, lambda: self.now_s, self.noted.append)
 
     def lost(self) -> dict[tuple[str, str], int]:
@@ -191,10 +202,16 @@ def test_who_is_not_on_the_roster_is_refused(mission: Mission) -> None:
         (Order(action="cut", who=NAMES[:3]), "cut: name one peer to cut off, or two"),
         (Order(action="cut", who=("base", "base")), "cut: base cannot be cut off from itself"),
         (Order(action="heal", who=("base", "agent")), "heal: name one peer at most"),
+        (Order(action="heal", for_s=2.0), "heal: that lasts, and --for does not go with it; leave it out"),
+        (Order(action="start"), "start: name one peer"),
+        (Order(action="start", who=("leader",)), "no peer is called leader: choose one of base, agent, robot1, robot2"),
+        (Order(action="start", who=("robot1",), for_s=2.0), "start: that lasts, and --for does not go with it"),
+        (Order(action="kill", who=("base",), at=(1.0, 2.0)), "kill: that puts nobody anywhere, and --at does not"),
+        (Order(action="start", who=("base",), at=(1.0, 2.0)), "--at [1, 2] is for robots, and base is none; leave"),
     ],
 )
 def test_an_order_that_does_not_fit_is_one_sentence_and_nothing_happens(rig: Rig, order: Order, sentence: str) -> None:
-    answer = obey(order, rig.chaos, NAMES)
+    answer = obey(order, rig.chaos, rig.replacements, NAMES)
     assert not answer.done
     assert answer.text.startswith(sentence)
     assert rig.stand.done == []
@@ -209,7 +226,7 @@ def test_orders(rig: Rig) -> None:
             Order(action="cut", who=("leader", "robot2")),
             Order(action="heal"),
         )
-        return [answer.text for order in orders if (answer := obey(order, rig.chaos, NAMES)).done]
+        return [answer.text for order in orders if (answer := obey(order, rig.chaos, rig.replacements, NAMES)).done]
 
     said = asyncio.run(play())
     assert said == [
@@ -220,7 +237,29 @@ def test_orders(rig: Rig) -> None:
     ]
     assert rig.stand.done == [("kill", "base", 2.0, False), ("pause", "robot1", chaos_control.PAUSE_S)]
     rig.leader = None
-    assert obey(Order(action="kill", who=("leader",)), rig.chaos, NAMES).text.startswith("nobody is known to lead")
+    assert obey(Order(action="kill", who=("leader",)), rig.chaos, rig.replacements, NAMES).text.startswith(
+        "nobody is known to lead"
+    )
+
+
+def test_a_peer_that_is_gone_is_started_where_there_is_room_for_it(rig: Rig) -> None:
+    def start(at: Point | None) -> Answer:
+        return obey(Order(action="start", who=("robot2",), at=at), rig.chaos, rig.replacements, NAMES)
+
+    assert start(None) == Answer(done=False, text="robot2 has a process; start those that have none")
+    rig.stand.down = {"robot2"}
+    rig.stand.done.clear()
+    for at, sentence in (
+        ((7.0, 1.0), "map.json: --at [7, 1] is inside a wall or off the map (x 0 to 6, y 0 to 6); move it"),
+        ((5.9, 3.0), "map.json: --at [5.9, 3] is 0.10 m from a wall, nearer than its radius of 0.2 m; move it"),
+        ((2.0, 4.5), "--at [2, 4.5] is 1.12 m from robot1, which may be driving; keep 1.40 m away from everybody"),
+    ):
+        answer = start(at)
+        assert not answer.done
+        assert sentence in answer.text
+    assert rig.stand.done == []
+    assert start((3.0, 4.0)) == start(None) == Answer(done=True, text="robot2 is started")
+    assert rig.stand.done == [("start", "robot2", (3.0, 4.0)), ("start", "robot2", None)]
 
 
 def test_keys() -> None:

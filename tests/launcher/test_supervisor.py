@@ -45,7 +45,13 @@ def rehearse(mission: Mission, tmp_path: Path) -> Callable[[dict[str, str]], tup
         said: list[str] = []
         planner = DeploymentPlanner(ROOM, (1.0, 1.0), 0.2, "inflection")
         team = Rehearsal(
-            mission, tmp_path, planner, said.append, lambda _, text: said.append(text), lambda _: (1.5, -2.5)
+            mission,
+            tmp_path,
+            planner,
+            said.append,
+            lambda _, text: said.append(text),
+            lambda _: (1.5, -2.5),
+            lambda name: said.append(f"{name} again"),
         )
         team.scripts = scripts
         return team, said
@@ -194,8 +200,50 @@ def test_who_is_killed_on_purpose_comes_back_when_it_is_to_and_that_is_no_crash(
         await team.stop()
 
     asyncio.run(play())
-    assert said == []
+    assert said == ["robot1 again"] * (supervision.RESTARTS + 2)
     assert not team.peers["robot1"].gone
+
+
+def test_who_is_gone_is_started_again_when_somebody_wants_it_to_be_and_where(
+    rehearse: Callable[[dict[str, str]], tuple[Rehearsal, list[str]]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(supervision, "BACKOFF_S", 0.01)
+    team, said = rehearse({"robot1": "import sys; sys.exit(3)"})
+    places = []
+    start_process = team.start_process
+
+    def note(peer: Peer) -> int:
+        places.append((peer.name, peer.incarnation, peer.place))
+        return start_process(peer)
+
+    async def play() -> None:
+        team.launch()
+        monkeypatch.setattr(team, "start_process", note)
+        team.watch()
+        assert not team.start("robot2"), "it has a process"
+        assert team.kill("robot2", None)
+        assert team.kill("base", 60.0)
+        await until(lambda: team.peers["robot2"].pid is team.peers["base"].pid is None)
+        assert team.peers["robot2"].gone
+        assert team.start("robot2", (2.5, 3.0))
+        assert team.start("base")
+        await until(lambda: None not in (team.peers["robot2"].pid, team.peers["base"].pid))
+        assert not team.peers["robot2"].gone
+        assert team.peers["robot2"].place is None, "that was for one process"
+        await until(lambda: team.peers["robot1"].given_up)
+        team.scripts = {}
+        assert team.start("robot1")
+        await until(lambda: team.peers["robot1"].pid is not None)
+        assert not team.peers["robot1"].gone
+        assert team.kill("robot1", None)
+        await until(lambda: team.peers["robot1"].pid is None)
+        await team.stop()
+
+    asyncio.run(play())
+    again = [place for place in places if place[0] != "robot1"]
+    assert sorted(again) == [("base", 1, None), ("robot2", 1, (2.5, 3.0))]
+    assert places[-1] == ("robot1", supervision.RESTARTS + 1, None)
+    assert sorted(text for text in said if text.endswith("again")) == ["base again", "robot1 again", "robot2 again"]
 
 
 def test_a_paused_peer_goes_on_by_itself_and_can_be_stopped_in_order(
@@ -252,7 +300,7 @@ def test_a_fork_server_that_does_not_answer_is_done_without(
 ) -> None:  # fmt: skip
     monkeypatch.setattr(fork_server, "ANSWER_WITHIN_S", 0.2)
     said: list[str] = []
-    team = Supervisor(mission, tmp_path, planner, said.append, lambda *_: None, lambda _: None)
+    team = Supervisor(mission, tmp_path, planner, said.append, lambda *_: None, lambda _: None, lambda _: None)
     (tmp_path / "logs").mkdir()
     server = team._forks = ForkServer(planner)
     os.kill(server.pid, number)
