@@ -70,6 +70,8 @@ class Auctioneer:
     hears = frozenset({"auction", "bid"})
 
     def __init__(self, allegiance: Allegiance, planner: Planner, base: str) -> None:
+        self.latest: Auction | None = None
+        """The last question of another that was taken."""
         self._allegiance, self._planner, self._base = allegiance, planner, base
         self._name = allegiance.name
         self._numbers = self._said = 0
@@ -160,6 +162,7 @@ class Auctioneer:
         """Look for an offer, or make the one again that has been made."""
         if self._allegiance.take("auction", auction.authority, sender, incarnation, auction.warrant, now_s):
             return
+        self.latest = auction
         order = (auction.authority.epoch, auction.auction)
         if self._bid is not None and order == (self._bid.epoch, self._bid.auction):
             self._effects.append(Publish(self._bid))

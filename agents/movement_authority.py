@@ -175,7 +175,11 @@ class MovementAuthority:
 
     def advance(self) -> Advance:
         """How far everybody is."""
-        return Advance(released=self.released, finished=dict(self._finished))
+        motion = self.motion
+        return Advance(
+            epoch=self.epoch, plan=motion.plan, revision=motion.revision, released=motion.released,
+            finished=dict(self._finished),
+        )  # fmt: skip
 
     def way(self, robot: str) -> tuple[Point, ...]:
         """Where a robot may be of which no more is heard: its stage and all that are released."""

@@ -71,6 +71,7 @@ from agents.records import (
     Planned,
     TopologyChange,
     Track,
+    TreeAnswer,
     in_words,
 )
 from agents.tree_layout import lay_out
@@ -212,7 +213,7 @@ class RerunRecorder:
                 self._log(f"log/{peer}", rr.TextLog(said, level=level))
             case LogLine():
                 self._log(f"log/{peer}", rr.TextLog(f"{peer}: {record.text}", level=_LEVELS[record.level]))
-        self._file.flush(now=isinstance(record, Decision | LogLine | Mishap))
+        self._file.flush(now=isinstance(record, Decision | LogLine | Mishap | TopologyChange | TreeAnswer))
 
     def close(self) -> None:
         """Finish the file. Safe to call twice, at exit and from a signal's handler on the main thread."""

@@ -56,6 +56,10 @@ class Ordered(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag
 class Advance(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag="advance"):
     """How far the motion is, as the leader knows it: numbers of stages of the present plan."""
 
+    epoch: int
+    """Of the leader."""
+    plan: int
+    revision: int
     released: int
     """Those that may be begun."""
     finished: dict[str, int]
@@ -77,6 +81,10 @@ class TopologyChange(msgspec.Struct, frozen=True, kw_only=True, tag_field="recor
     """Links of it that had to be confirmed."""
     released: tuple[Edge, ...]
     """Links of the tree before that it does without; they are kept if it has been given up."""
+    absent: tuple[str, ...]
+    """Ends of new links that were not asked, since they were not there."""
+    motion: tuple[int, int] | None
+    """Plan and revision of the motion that leads to where the new links are; none: they are where everybody stands."""
     method: Method
     rounds: int
     """How often the proposal was said."""
@@ -84,6 +92,33 @@ class TopologyChange(msgspec.Struct, frozen=True, kw_only=True, tag_field="recor
     """From then on until it was settled."""
     reason: str
     """Why it was made, or why it has been given up."""
+
+
+class TreeAnswer(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag="tree_answer"):
+    """What a peer says of the team's tree, before it says it; with every change."""
+
+    proposal: tuple[int, int] | None
+    """Number of the proposal that it answers."""
+    confirmed: tuple[str, ...]
+    """Ends of new links of that proposal with this peer that it sees, or will."""
+    kept: tuple[int, int] | None
+    """Number of the tree whose links it keeps."""
+
+
+class Taken(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag="taken"):
+    """A peer has taken orders of another that it had not: of another reign, another decision or another motion."""
+
+    epoch: int
+    leader: str
+    sequence: int
+    """Of the authority that they were taken with."""
+    decision: int
+    motion: tuple[int, int] | None
+    """Plan and revision; none: hold."""
+    lease_s: float
+    """What was left of the leader's lease when they were given."""
+    sent_at_s: float
+    """When they were, in seconds since 1970 by the leader's clock."""
 
 
 class Planned(msgspec.Struct, frozen=True, kw_only=True, tag_field="record", tag="planned"):
@@ -186,4 +221,6 @@ AnyRecord: TypeAlias = (
     | LogLine
     | Mishap
     | TopologyChange
+    | TreeAnswer
+    | Taken
 )

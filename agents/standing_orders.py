@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from agents.allegiance import Allegiance
-from agents.records import LogLine
+from agents.records import LogLine, Taken
 from agents.role import Effect, Event, Heard, Record
 from protocol.messages import Deployment, Reign
 
@@ -47,8 +47,10 @@ class StandingOrders:
         if not isinstance(event, Heard) or not isinstance(event.envelope.body, Deployment):
             return ()
         envelope, orders = event.envelope, event.envelope.body
-        overtaken = self._reign == _reign(orders, envelope.sender, envelope.incarnation)
+        before, overtaken = self.latest, self._reign == _reign(orders, envelope.sender, envelope.incarnation)
         refusal = self._judge(orders, envelope.sender, envelope.incarnation, now_s)
+        if not refusal and not (overtaken and before is not None and _what(before) == _what(orders)):
+            return (Record(_describe(orders, envelope.sent_at_s)),)
         if not refusal or overtaken or (envelope.sender, refusal) == self._refused:
             return ()
         self._refused = envelope.sender, refusal
@@ -61,6 +63,22 @@ class StandingOrders:
             self.latest, self._reign = orders, _reign(orders, sender, incarnation)
             self._refused = ("", "")
         return refusal
+
+
+def _what(orders: Deployment) -> tuple[int, tuple[int, int] | None]:
+    """Decision, and plan and revision of the motion: what repetitions have in common."""
+    motion = orders.motion
+    return orders.decision, None if motion is None else (motion.plan, motion.revision)
+
+
+def _describe(orders: Deployment, sent_at_s: float) -> Taken:
+    """Orders that have been taken, for the recording."""
+    decision, motion = _what(orders)
+    authority = orders.authority
+    return Taken(
+        epoch=authority.epoch, leader=authority.leader, sequence=authority.sequence, decision=decision, motion=motion,
+        lease_s=orders.warrant.lease_s, sent_at_s=sent_at_s,
+    )  # fmt: skip
 
 
 def _reign(orders: Deployment, sender: str, incarnation: int) -> Reign:

@@ -18,7 +18,7 @@ from agents.allegiance import AT_ONCE_S, Allegiance
 from agents.collection import Collection as Others
 from agents.link_sight import Scene, judge_links, stages_in_sight
 from agents.mission import Mission
-from agents.records import LogLine, TopologyChange
+from agents.records import LogLine, TopologyChange, TreeAnswer
 from agents.role import Compute, Effect, Event, Heard, JobDone, Publish, Record
 from agents.standing_orders import StandingOrders
 from agents.surroundings import Body, Estimate, Surroundings
@@ -305,6 +305,7 @@ class TeamTree:
     def _settle(self, done: Settled) -> None:
         self._news = True
         proposal, before = done.proposal, done.before
+        since = next((link.since for link in proposal.links if link.since is not None), None)
         self._effects.append(
             Record(
                 TopologyChange(
@@ -314,6 +315,8 @@ class TeamTree:
                     edges=proposal.tree.edges,
                     new=tuple(link.ends for link in proposal.links),
                     released=proposal.released,
+                    absent=tuple(sorted(done.absent)),
+                    motion=None if since is None else (since.plan, since.revision),
                     method=proposal.method,
                     rounds=proposal.round + 1,
                     duration_s=done.duration_s,
@@ -327,6 +330,8 @@ class TeamTree:
         answer = self.held.confirmation
         if answer == self._answer and now_s < self._answer_at_s:
             return
+        if answer != self._answer:
+            self._effects.append(Record(_describe(answer)))
         self._answer, self._answer_at_s = answer, now_s + ANSWER_S
         self._effects.append(Publish(answer))
         if self._allegiance.leads(now_s):
@@ -340,3 +345,12 @@ class TeamTree:
 
     def _log(self, level: Literal["info", "warning", "error"], text: str) -> None:
         self._effects.append(Record(LogLine(level=level, text=text)))
+
+
+def _describe(answer: Confirmation) -> TreeAnswer:
+    """An answer for the recording."""
+    return TreeAnswer(
+        proposal=answer.proposal,
+        confirmed=tuple(view.peer for view in answer.views if view.verdict != "refuses"),
+        kept=None if answer.committed is None else answer.committed.number,
+    )

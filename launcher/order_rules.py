@@ -3,16 +3,30 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import Final
+from typing import Any, Final, Protocol
 
+from agents.auction import Auctioneer
 from agents.motion_message import end_stage, piece
 from agents.robot import Robot
 from agents.standing_orders import StandingOrders
+from agents.topology import TeamTree
 from launcher.simulated_peer import SimulatedPeer, holds_lease
 from launcher.violation import Violation
-from protocol.messages import Authority, Deployment, Envelope, MemberWay, Motion, Progress, State, Warrant
+from protocol.messages import (
+    Auction,
+    Authority,
+    Deployment,
+    Envelope,
+    MemberWay,
+    Motion,
+    Progress,
+    State,
+    Topology,
+    Warrant,
+)
 
 REMEMBERED_S: Final = 30.0
 """Orders are remembered for so long; none can be taken that is older."""
@@ -26,6 +40,32 @@ OFF_M: Final = 0.02
 ROUNDING_S: Final = 1e-6
 
 
+class Holder(Protocol):
+    """Part of a mind that takes orders of one kind."""
+
+    @property
+    def latest(self) -> Deployment | Topology | Auction | None:
+        """The last that was taken."""
+
+
+@dataclass(slots=True)
+class _Hand:
+    """What a process has in hand of orders of one kind."""
+
+    kind: str
+    holder: Holder
+    seen: object = None
+    """The last that was looked at."""
+
+
+HOLDERS: Final[Mapping[str, tuple[type[object], Callable[[Any], Holder]]]] = {
+    "deployment": (StandingOrders, lambda part: part),
+    "topology": (TeamTree, lambda part: part.held),
+    "auction": (Auctioneer, lambda part: part),
+}
+"""By kind of order: which part of a mind takes it, and what that part says of it."""
+
+
 class OrderRules:
     """Orders are given within a lease only, taken while the lease runs that they were given in, and in their order.
 
@@ -35,42 +75,56 @@ class OrderRules:
 
     def __init__(self, keeps_disks: bool) -> None:
         self._keeps_disks = keeps_disks
-        self._given: dict[tuple[int, str, int], float] = {}
-        """Deployments by epoch, leader and sequence: when the lease ends that they were given in, by true time."""
-        self._taken: dict[str, Authority] = {}
-        """The last that each peer took."""
+        self._given: dict[tuple[str, int, str, int], float] = {}
+        """By kind, epoch, leader and sequence: when the lease ends that they were given in, by true time."""
+        self._taken: dict[tuple[str, str], Authority] = {}
+        """The last of each kind that each peer took."""
+        self._hands: dict[str, tuple[object, list[_Hand]]] = {}
+        """By peer: its present role, and what that holds."""
 
     def hear(self, peer: SimulatedPeer, envelope: Envelope) -> None:
         """Who says what bears a warrant must hold a lease."""
-        warrant = getattr(envelope.body, "warrant", None)
-        if not isinstance(warrant, Warrant):
+        body = envelope.body
+        if not isinstance(getattr(body, "warrant", None), Warrant):
             return
         if not holds_lease(peer):
             raise Violation("orders are given within a lease", f"{peer.name} says {envelope.kind} without one")
-        if isinstance(envelope.body, Deployment):
-            authority = envelope.body.authority
-            ends_s = peer.clock.when(peer.now_s + warrant.lease_s)
-            self._given[authority.epoch, authority.leader, authority.sequence] = ends_s
+        if isinstance(body, Deployment | Topology | Auction) and peer.allegiance is not None:
+            authority = body.authority
+            ends_s = peer.clock.when(peer.allegiance.election.lease_until_s)
+            self._given[envelope.kind, authority.epoch, authority.leader, authority.sequence] = ends_s
             self._forget(ends_s - REMEMBERED_S)
 
     def look(self, peer: SimulatedPeer) -> None:
         """What it has taken last must be in time, and later than what it took before."""
-        orders = peer.part(StandingOrders)
-        latest = None if orders is None else orders.latest
-        before = self._taken.get(peer.name)
-        if latest is None or latest.authority is before:
-            return
-        authority = latest.authority
-        self._taken[peer.name] = authority
+        role, hands = self._hands.get(peer.name, (None, ()))
+        if role is not peer.role:
+            hands = self._look_for(peer)
+        for hand in hands:
+            latest = hand.holder.latest
+            if latest is not hand.seen and latest is not None:
+                hand.seen = latest
+                self._judge(peer, hand.kind, latest.authority)
+
+    def _look_for(self, peer: SimulatedPeer) -> list[_Hand]:
+        """Where a process that has just begun keeps what it takes."""
+        parts = ((kind, peer.part(part), holder) for kind, (part, holder) in HOLDERS.items())
+        hands = [_Hand(kind, holder(part)) for kind, part, holder in parts if part is not None]
+        self._hands[peer.name] = peer.role, hands
+        return hands
+
+    def _judge(self, peer: SimulatedPeer, kind: str, authority: Authority) -> None:
+        before = self._taken.get((peer.name, kind))
+        self._taken[peer.name, kind] = authority
+        what = f"{peer.name} takes {kind} {_order(authority)}"
         if before is not None and self._keeps_disks and _order(authority) <= _order(before) and authority != before:
-            text = f"{peer.name} takes {_order(authority)} after {_order(before)}"
-            raise Violation("no older order after a newer one", text)
-        ends_s = self._given.get((authority.epoch, authority.leader, authority.sequence))
+            raise Violation("no older order after a newer one", f"{what} after {_order(before)}")
+        ends_s = self._given.get((kind, authority.epoch, authority.leader, authority.sequence))
         if ends_s is None:
-            raise Violation("orders taken have been given", f"{peer.name} takes {_order(authority)}, which nobody gave")
+            raise Violation("orders taken have been given", f"{what}, which nobody gave")
         late_s = peer.true_s - ends_s
         if late_s > ROUNDING_S:
-            text = f"{peer.name} takes {_order(authority)} {late_s:.3f} s after the lease that it was given in"
+            text = f"{what} {late_s:.3f} s after the lease that it was given in"
             raise Violation("no order is taken when its lease has ended", text)
 
     def _forget(self, before_s: float) -> None:

@@ -23,6 +23,8 @@ class HeldTree:
         """The last tree in force that it knows of."""
         self.proposal: TreeProposal | None = None
         """The open proposal, as far as it knows."""
+        self.latest: Topology | None = None
+        """The last word that was taken."""
         self._name = name
         self._views: dict[str, LinkView] = {}
 
@@ -33,6 +35,7 @@ class HeldTree:
 
     def take(self, word: Topology) -> str:
         """Learn what is in force and what is proposed; says what is wrong with the word, nothing if all is well."""
+        self.latest = word
         tree, proposal = word.committed, word.proposal
         for stated in (tree, proposal.tree if proposal is not None else None):
             if stated is not None and (fault := find_fault(stated)):

@@ -99,6 +99,8 @@ class Settled:
     duration_s: float
     reason: str
     """Why it was made, or why it has been given up."""
+    absent: frozenset[str]
+    """Ends of its links that were not asked, since they were not there."""
 
 
 Event: TypeAlias = Elected | Deposed | Propose | Withdraw | Heard | Tick
@@ -294,7 +296,8 @@ class Negotiation:
         self.committed = done.proposal.tree
         self._rests_until_s = now_s + REST_S
         self._occur(Occurrence.CONFIRMED)
-        self._effects.append(Settled(done.proposal, before, True, now_s - done.opened_s, done.proposal.tree.reason))
+        proposal, took_s = done.proposal, now_s - done.opened_s
+        self._effects.append(Settled(proposal, before, True, took_s, proposal.tree.reason, done.absent))
         self._say(now_s)
 
     def _give_up(self, occurrence: Occurrence, reason: str, now_s: float) -> None:
@@ -306,7 +309,7 @@ class Negotiation:
     def _drop(self, reason: str, now_s: float) -> None:
         assert self._open is not None
         done, self._open = self._open, None
-        self._effects.append(Settled(done.proposal, self.committed, False, now_s - done.opened_s, reason))
+        self._effects.append(Settled(done.proposal, self.committed, False, now_s - done.opened_s, reason, done.absent))
 
     def _say(self, now_s: float) -> None:
         self._says_at_s = now_s + ROUND_S
