@@ -59,17 +59,20 @@ def describe_trees(proposals: tuple[SettledProposal, ...]) -> str:
 
 
 def tabulate_trees(proposals: tuple[SettledProposal, ...]) -> Table:
-    """Each proposal with its reason."""
-    table = Table("time", "tree", "new links", "released", "rounds", "took", "reason", title="The team's tree")
+    """Each proposal, and why it was given up if it was. Why one was made is said of the leader's decision."""
+    table = Table("time", "tree", title="The team's tree: proposals by epoch and number")
+    table.add_column("new links", overflow="fold")
+    table.add_column("rounds")
+    table.add_column("took")
     for proposal in proposals:
-        in_force = proposal.in_force
+        links = f"{in_words(proposal.new)} instead of {in_words(proposal.released)}"
+        if not proposal.released:
+            links = in_words(proposal.new)
         table.add_row(
             f"{proposal.time_s:.2f} s",
             f"{proposal.epoch}.{proposal.number} by {proposal.leader}",
-            in_words(proposal.new),
-            in_words(proposal.released) if in_force else "none",
+            links if proposal.in_force else f"{in_words(proposal.new)} given up: {proposal.reason}",
             str(proposal.rounds),
             f"{1e3 * proposal.duration_s:.0f} ms",
-            proposal.reason if in_force else f"given up: {proposal.reason}",
         )
     return table

@@ -103,7 +103,7 @@ class Supervisor:
         self._crashed = crashed
         self._find = find
         self._revived = revived
-        self._stopping = False
+        self._stopping = asyncio.Event()
         self._watchers: list[asyncio.Task[None]] = []
         self._paused: dict[str, asyncio.TimerHandle] = {}
         self._forks: ForkServer | None = None
@@ -170,7 +170,7 @@ class Supervisor:
 
     async def stop(self) -> None:
         """Ask every process to end, kill what still runs after :data:`TERMINATE_S`, wait until all are gone."""
-        self._stopping = True
+        self._stopping.set()
         for peer in self.peers.values():
             peer.due.set()
         for name in tuple(self._paused):
@@ -219,7 +219,7 @@ class Supervisor:
         while peer.pid is not None:
             status = await wait_for_end(peer.pid)
             peer.pid = None
-            if self._stopping:
+            if self._stopping.is_set():
                 return
             peer.due.clear()
             if (timer := self._paused.pop(peer.name, None)) is not None:
@@ -229,7 +229,7 @@ class Supervisor:
             pause_s = self._judge_crash(peer, status) if peer.killed is None else peer.killed.back_after_s
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(peer.due.wait(), pause_s)
-            if self._stopping:
+            if self._stopping.is_set():
                 return
             revived = peer.killed is not None or peer.given_up
             peer.incarnation += 1

@@ -139,7 +139,7 @@ def test_stop_kills_what_does_not_want_to_end_and_says_so(
     rehearse: Callable[[dict[str, str]], tuple[Rehearsal, list[str]]], tmp_path: Path
 ) -> None:
     team, said = rehearse({"agent": STUBBORN})
-    pids = []
+    pids: list[int] = []
 
     async def play() -> None:
         team.launch()
@@ -224,7 +224,7 @@ def test_who_is_gone_is_started_again_when_somebody_wants_it_to_be_and_where(
         assert team.kill("robot2", None)
         assert team.kill("base", 60.0)
         await until(lambda: team.peers["robot2"].pid is team.peers["base"].pid is None)
-        assert team.peers["robot2"].gone
+        assert [peer.name for peer in team.peers.values() if peer.gone] == ["robot2"], "base would come back"
         assert team.start("robot2", (2.5, 3.0))
         assert team.start("base")
         await until(lambda: None not in (team.peers["robot2"].pid, team.peers["base"].pid))
