@@ -72,9 +72,9 @@ def check_order(order: Order, names: Sequence[str]) -> None:
     if len({*order.who}) < len(order.who):
         raise ScenarioFault(f"cut: {order.who[0]} cannot be cut off from itself; name two peers")
     if order.for_s is not None and order.action in ("heal", "start"):
-        raise ScenarioFault(f"{order.action}: that lasts, and --for does not go with it; leave it out")
+        raise ScenarioFault(f"--for does not go with {order.action}; leave it out")
     if order.at is not None and order.action != "start":
-        raise ScenarioFault(f"{order.action}: that puts nobody anywhere, and --at does not go with it; leave it out")
+        raise ScenarioFault(f"--at does not go with {order.action}; leave it out")
 
 
 def give_order(run: RunFolder, mission: Mission, order: Order) -> str:
