@@ -75,8 +75,10 @@ class TopologyChange(msgspec.Struct, frozen=True, kw_only=True, tag_field="recor
     """Whether it is in force."""
     before: tuple[Edge, ...]
     """Links of the tree that was in force when it was proposed."""
+    members: tuple[str, ...]
+    """Who the tree proposed is to join."""
     edges: tuple[Edge, ...]
-    """Links of the tree proposed."""
+    """Its links."""
     new: tuple[Edge, ...]
     """Links of it that had to be confirmed."""
     released: tuple[Edge, ...]

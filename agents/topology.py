@@ -312,6 +312,7 @@ class TeamTree:
                     number=proposal.tree.number,
                     committed=done.committed,
                     before=() if before is None else before.edges,
+                    members=proposal.tree.members,
                     edges=proposal.tree.edges,
                     new=tuple(link.ends for link in proposal.links),
                     released=proposal.released,

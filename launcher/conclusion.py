@@ -34,8 +34,8 @@ def conclude(folder: RunFolder) -> Metrics:
 def measure_run(folder: RunFolder) -> Metrics:
     """Measure a run whose recordings have been merged, and write ``metrics.json``.
 
-    Every motion that was ordered is certified once more, from the recording alone, and the rules of leading are held
-    against it: one leader at a time, orders in office only, rising epochs, trees that span (:mod:`launcher.reigns`).
+    Every motion that was ordered is certified once more, from the recording alone, and the rules of leading, of orders
+    and of trees are held against it (:mod:`launcher.recorded_rules`).
 
     Raises:
         ValueError: as above.

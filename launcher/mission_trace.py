@@ -89,5 +89,5 @@ class MissionTrace:
             control_hz=mission.control_hz,
             planning_period_s=mission.planning_period_s,
             duration_s=duration_s,
-            reigns=find_reigns(ordered),
+            reigns=find_reigns(ordered, mission.epoch_unix_s),
         )

@@ -17,9 +17,10 @@ from agents.motion_level import AGENT, CHAIN, TEAM, certified_level
 from agents.self_report import silence_s
 from launcher.contacts import Overlap, find_overlaps
 from launcher.mission_trace import MissionTrace, Trail
-from launcher.reigns import Spell, Takeover
+from launcher.reigns import Takeover
 from launcher.report_estimate import EstimateFigures, failures_of, measure_estimates
 from launcher.report_trees import SettledProposal, settled_proposals
+from launcher.spells import Spell
 from launcher.wording import counted
 from planning.environment import Environment
 

@@ -6,10 +6,11 @@ from rich.console import Group
 from rich.table import Table
 
 from launcher.contacts import Overlap
-from launcher.reigns import Spell, Takeover
+from launcher.reigns import Takeover
 from launcher.report import Metrics, Shares
 from launcher.report_estimate import EstimateFigures
 from launcher.report_trees import describe_trees, tabulate_trees
+from launcher.spells import Spell
 from launcher.wording import counted
 
 
@@ -115,7 +116,10 @@ def _describe_rules(metrics: Metrics) -> list[str]:
         return []
     if metrics.leading_faults:
         return [f"broken {counted(len(metrics.leading_faults), 'time')}: {metrics.leading_faults[0]}"]
-    return ["kept: one leader at a time, orders in office only, rising epochs, trees that join whom they name"]
+    return [
+        "kept: one leader at a time, orders in office only and taken in time and in their order, trees that join whom "
+        "they name, in force when both ends of each new link had confirmed it, and nobody let go on before"
+    ]
 
 
 def _describe_takeover(takeover: Takeover) -> str:

@@ -125,7 +125,7 @@ class TreeRules:
             raise Violation("trees are numbered", f"two trees are number {number}")
         if latest is not None and number < latest.number:
             raise Violation("trees are numbered", f"{number} comes into force after {latest.number}")
-        if not _spans(tree):
+        if not spans(tree.members, tree.edges):
             raise Violation("trees span their members", f"{number}: {tree.edges} do not join {tree.members}")
         if known is not None and known.tree != tree:
             raise Violation("trees in force were proposed", f"{number} was another tree when it was")
@@ -165,13 +165,13 @@ def _links(edges: tuple[Edge, ...]) -> Links:
     return frozenset(frozenset(edge) for edge in edges)
 
 
-def _spans(tree: Tree) -> bool:
+def spans(members: Sequence[str], edges: Sequence[Edge]) -> bool:
     """Whether all members, and nobody else, are joined without a circle: by growing parts together."""
-    part = {member: {member} for member in tree.members}
-    for one, other in tree.edges:
+    part = {member: {member} for member in members}
+    for one, other in edges:
         if one not in part or other not in part or part[one] is part[other]:
             return False
         joined = part[one] | part[other]
         for member in joined:
             part[member] = joined
-    return len(part) == len(tree.members) == len(tree.edges) + 1
+    return len(part) == len(members) == len(edges) + 1
