@@ -67,16 +67,19 @@ class DiscDriver:
 
     def advance(self, now_s: float) -> None:
         """Integrate the command until ``now_s``; what would leave the free space ends at its border. O(walls)."""
-        moves_s = min(now_s, self._drives_until_s) - self._now_s
+        self._position = self.place_at(now_s)
         self._now_s = max(now_s, self._now_s)
+
+    def place_at(self, time_s: float) -> Point:
+        """Where it is at a time, now or later, if it is told nothing more. Changes nothing."""
+        moves_s = min(time_s, self._drives_until_s) - self._now_s
         if moves_s <= 0.0 or self._velocity == (0.0, 0.0):
-            return
+            return self._position
         (x, y), (u, v) = self._position, self._velocity
         wanted = (x + u * moves_s, y + v * moves_s)
         if self._free is None or self._free.line_of_sight(self._position, wanted):
-            self._position = wanted
-        else:
-            self._position = _last_visible(self._free, self._position, wanted)
+            return wanted
+        return _last_visible(self._free, self._position, wanted)
 
     def pose(self) -> Point:
         """Where the centre of the disc is at the time it was last advanced to."""

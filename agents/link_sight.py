@@ -99,7 +99,9 @@ def _first_stage(scene: Scene, link: Edge) -> int | None:
         sees = bool(environment.line_of_sight(np.array(known[link[0]]), np.array(known[link[1]])))
         return (0 if motion is None else end_stage(motion)) if sees else None
     ways = [moving[end] for end in link]
-    if not bool(environment.line_of_sight(*(np.array(way.waypoints[-1]) for way in ways))):
+    if not environment.is_convex and not bool(
+        environment.line_of_sight(*(np.array(way.waypoints[-1]) for way in ways))
+    ):
         return None
     # Who sees the other from a stage on sees it from any later one on.
     low, high = 0, len(ways[0].stages) - 1
@@ -114,6 +116,8 @@ def _first_stage(scene: Scene, link: Edge) -> int | None:
 
 def _see_each_other(environment: Environment, motion: Motion, ways: Sequence[MemberWay], first: int) -> bool:
     """Whether two members do throughout the stages from one on, counted from the first one contained."""
+    if environment.is_convex:
+        return True
     rest = tuple(
         # Who is in the way of whom is not asked here.
         structs.replace(
@@ -140,6 +144,6 @@ def _first_stage_with_agent(scene: Scene, motion: Motion, relay: MemberWay) -> i
 
 
 def _sees_some(scene: Scene, place: Point) -> bool:
-    if scene.may_be is None:
+    if scene.may_be is None or (scene.may_be and scene.environment.is_convex):
         return True
     return bool(scene.may_be) and bool(np.any(scene.environment.line_of_sight(np.array(place), np.array(scene.may_be))))

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from copy import copy
 from functools import lru_cache
 from random import Random
 from typing import TYPE_CHECKING, Final, TypeVar
@@ -184,9 +183,7 @@ class SimulatedPeer:
         """Where its body truly is now."""
         if self._body is None:
             return self._mission.entry(self.name).start
-        body = copy(self._body)  # looking at it must change nothing
-        body.advance(self._time.now_s)
-        return body.pose()
+        return self._body.place_at(self._time.now_s)
 
     def start(self) -> None:
         """Begin a process where there is none: it joins the network, and its role begins."""

@@ -131,6 +131,11 @@ class Environment:
         return reflex
 
     @cached_property
+    def is_convex(self) -> bool:
+        """Whether everywhere is in sight of everywhere."""
+        return not self.holes and not self.is_reflex.any()
+
+    @cached_property
     def reflex_vertices(self) -> Floats:
         """(r, 2) float: the vertices around which shortest paths bend and behind which robots hide."""
         return _freeze(self.vertices[self.is_reflex])

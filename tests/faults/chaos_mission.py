@@ -47,6 +47,15 @@ BLACKOUTS: Final = 0.04
 """Share of the occasions on which all voters, or most of them, are killed at about the same time."""
 
 
+SIZES: Final = (40, 25, 15, 12, 8)
+"""How often teams have the least number of robots, one more, and so on: what breaks a rule breaks it in small teams
+too, mostly, and of these many can be looked at."""
+
+MORE_S: Final = 7.0
+"""By so much missions are longer, on average, than the shortest."""
+
+PLANNING_PERIODS_S: Final = (0.5, 1.0, 2.0)
+
 RANGING: Final = Ranging(noise_m=Ranging().bound_m)
 """Ranges are as wrong as they may be."""
 
@@ -64,6 +73,8 @@ class ChaosCase(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """Whether the agent does."""
     retreat_after_s: float = 10.0
     """When robots that nobody leads go back."""
+    planning_period_s: float = 1.0
+    """How often the leader plans anew."""
     map: str = ""
     """A packaged map, with the full planner; none: the open room, with the light one."""
     faults: tuple[Fault, ...] = ()
@@ -97,7 +108,7 @@ class ChaosCase(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
             agent_speed_m_s=0.8,
             control_hz=2.0,
             heartbeat_hz=1.0,
-            planning_period_s=1.0,
+            planning_period_s=self.planning_period_s,
             decomposition="inflection",
             duration_s=self.duration_s,
             seed=self.seed,
@@ -121,13 +132,15 @@ def draw_case(
 
     Args:
         seed: of everything.
-        robots: least and greatest number of them; base station and agent come on top.
+        robots: least and greatest number of them, at most five sizes; base station and agent come on top.
         duration_s: least and greatest, seconds.
         clocks: whether they may differ by more than those can that share an estimate.
     """
     chance = Random(f"{seed}/case")
-    count, ends_s = chance.randint(*robots), float(chance.randint(*duration_s))
-    retreat_after_s = chance.choice(RETREATS_AFTER_S)
+    sizes = range(robots[0], robots[1] + 1)
+    (count,) = chance.choices(sizes, SIZES[: len(sizes)])
+    ends_s = float(min(duration_s[0] + int(chance.expovariate(1.0 / MORE_S)), duration_s[1]))
+    retreat_after_s, planning_period_s = chance.choice(RETREATS_AFTER_S), chance.choice(PLANNING_PERIODS_S)
     voters = ("base", *robot_names(count))
     loses_disks = chance.random() < 0.15
     faults: list[Fault] = []
@@ -149,7 +162,10 @@ def draw_case(
     if bleeds:  # whoever else died or hung then would keep all others from going back
         faults = [fault for fault in faults if not isinstance(fault, Kill | Pause)]
     faults = sorted(faults + bleeds, key=lambda fault: fault.at_s)
-    return ChaosCase(seed=seed, robots=count, duration_s=ends_s, retreat_after_s=retreat_after_s, faults=tuple(faults))
+    return ChaosCase(
+        seed=seed, robots=count, duration_s=ends_s, retreat_after_s=retreat_after_s,
+        planning_period_s=planning_period_s, faults=tuple(faults),
+    )  # fmt: skip
 
 
 def draw_clocks(chance: Random, voters: Sequence[str]) -> list[Fault]:
@@ -248,7 +264,7 @@ def write_case(case: ChaosCase) -> str:
         lines.append(f"ends_s = {case.ends_s}")
     if not case.announces:
         lines.append("announces = false")
-    lines.append(f"retreat_after_s = {case.retreat_after_s}")
+    lines += [f"retreat_after_s = {case.retreat_after_s}", f"planning_period_s = {case.planning_period_s}"]
     if case.map:
         lines.append(f'map = "{case.map}"')
     return "\n".join(lines) + "\n\n" + write_timetable(case.timetable)

@@ -49,7 +49,7 @@ def real_mission(case: ChaosCase) -> Mission:
         agent_speed_m_s=0.5,
         control_hz=5.0,
         heartbeat_hz=2.0,
-        planning_period_s=0.5,
+        planning_period_s=case.planning_period_s,
         decomposition="inflection",
         duration_s=case.duration_s,
         seed=case.seed,

@@ -17,7 +17,7 @@ from tests.faults.shrinking import shrink
 
 SEEDS = range(1000, 1010)
 
-RETREATING = 82
+RETREATING = 33
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -30,7 +30,9 @@ def test_no_rule_is_broken(seed: int) -> None:
 
 def test_the_missions_are_hard() -> None:
     """Several things go wrong in each; leaders are replaced, and the last one is obeyed after the last fault."""
-    assert all(len(draw_case(seed).faults) >= 8 for seed in range(100))
+    faults = sorted(len(draw_case(seed).faults) for seed in range(100))
+    assert faults[0] >= 5
+    assert faults[50] >= 20
     verdict = run_chaos(draw_case(1001, (2, 3), (14, 20)))
     reigns = {record.leads for _, _, record in verdict.history if isinstance(record, Office)} - {None}
     assert len(reigns) > 1
