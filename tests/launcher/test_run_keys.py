@@ -96,12 +96,15 @@ def screen(tmp_path: Path) -> Iterator[Screen]:
 def test_keys_cut_off_kill_and_pause_the_leader_and_ctrl_c_ends_the_run(screen: Screen) -> None:
     screen.shows("Keys: k kills the leader")
     screen.shows("base leads")
-    screen.press("c", "base cut off from all others for 5 s")
-    screen.press("h", "over: base cut off from all others for 5 s")
-    first = screen.press("k", r"(\w+) is killed for 5 s")[1]
-    second = screen.shows(rf"(base|robot1|robot2)(?<!{first}) leads", len(screen.text))[1]
-    assert screen.press("p", r"(\w+) is paused for 3 s")[1] == second
-    robot = "robot2" if "robot1" in (first, second) else "robot1"
+    cut = screen.press("c", r"(\w+) cut off from all others for 5 s")[1]
+    os.write(screen.keyboard, b"h")
+    screen.shows(f"over: {cut} cut off from all others for 5 s")
+    killed = screen.press("k", r"(\w+) is killed for 5 s")[1]
+    screen.shows(rf"(base|robot1|robot2)(?<!{killed}) leads", len(screen.text))
+    paused = screen.press("p", r"(\w+) is paused for 3 s")[1]
+    for leader in (cut, killed, paused):
+        assert f"{leader} leads" in screen.text
+    robot = next((robot for robot in ("robot1", "robot2") if robot not in (killed, paused)), paused)
     assert screen.press("x" + robot[-1], r"(\w+) is killed for 5 s")[1] == robot, "x means nothing"
     screen.press("\x03", r"Stopping \.\.\.")
     assert screen.launcher.wait(PATIENCE_S) == 130, screen.text
