@@ -9,8 +9,9 @@ of parts (:mod:`agents.mind`).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from typing import Any, Final, Protocol, TypeAlias
+
+import msgspec
 
 from agents.driver import Ranged
 from agents.records import AnyRecord
@@ -29,23 +30,20 @@ RETRY_S: Final = 0.2
 """Who failed while it was awake, and so asked for no further wake-up, is woken again after this."""
 
 
-@dataclass(frozen=True, slots=True)
-class Woken:
+class Woken(msgspec.Struct, frozen=True):
     """The moment asked for with :class:`WakeAt` has come. ``position`` is where the driver says the body is."""
 
     position: Point
 
 
-@dataclass(frozen=True, slots=True)
-class Heard:
+class Heard(msgspec.Struct, frozen=True):
     """A well-formed message arrived whose sender is the one its key names."""
 
     address: Address
     envelope: Envelope
 
 
-@dataclass(frozen=True, slots=True)
-class JobDone:
+class JobDone(msgspec.Struct, frozen=True):
     """A computation asked for with :class:`Compute` has ended: with a result, or with the text of its failure."""
 
     job: str
@@ -58,15 +56,13 @@ Event: TypeAlias = Woken | Ranged | Heard | JobDone | Written | PeerAppeared | P
 """``Written`` tells what became of a ``Persist``; both are those of :mod:`protocol.core`."""
 
 
-@dataclass(frozen=True, slots=True)
-class Publish:
+class Publish(msgspec.Struct, frozen=True):
     """Say this; the shell puts it in an envelope and finds the key."""
 
     body: AnyBody
 
 
-@dataclass(frozen=True, slots=True)
-class Drive:
+class Drive(msgspec.Struct, frozen=True):
     """Move at this velocity, in metres per second, for at most so long. A later one replaces an earlier one.
 
     Counted from the moment of the :class:`Woken` that it answers, so that a leg ends where it was meant to.
@@ -77,22 +73,19 @@ class Drive:
     """Then the body stands by itself, whatever has become of the mind."""
 
 
-@dataclass(frozen=True, slots=True)
-class Record:
+class Record(msgspec.Struct, frozen=True):
     """Put this into the recording."""
 
     record: AnyRecord
 
 
-@dataclass(frozen=True, slots=True)
-class WakeAt:
+class WakeAt(msgspec.Struct, frozen=True):
     """Send :class:`Woken` at this mission time, in seconds. A later request replaces an earlier one."""
 
     time_s: float
 
 
-@dataclass(frozen=True, slots=True)
-class Compute:
+class Compute(msgspec.Struct, frozen=True):
     """Run a pure function beside the control loop; :class:`JobDone` carries the result back under the same name.
 
     Live it runs in a worker thread, in simulation inline with a modelled delay. A role has one job of a name

@@ -8,27 +8,25 @@ speakers, or the absence of duplicates; everything above copes with that.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Protocol, TypeAlias
 
+import msgspec
 
-@dataclass(frozen=True, slots=True)
-class Received:
+
+class Received(msgspec.Struct, frozen=True):
     """A publication arrived."""
 
     key: str
     payload: bytes
 
 
-@dataclass(frozen=True, slots=True)
-class PeerAppeared:
+class PeerAppeared(msgspec.Struct, frozen=True):
     """The liveliness token of a peer was seen."""
 
     peer: str
 
 
-@dataclass(frozen=True, slots=True)
-class PeerVanished:
+class PeerVanished(msgspec.Struct, frozen=True):
     """The liveliness token of a peer is gone: its process ended, or its lease ran out."""
 
     peer: str

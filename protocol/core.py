@@ -7,19 +7,18 @@ must go on while the machine is suspended (``CLOCK_BOOTTIME``, not ``CLOCK_MONOT
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
+
+import msgspec
 
 from protocol.messages import AnyBody
 
 
-@dataclass(frozen=True, slots=True)
-class Tick:
+class Tick(msgspec.Struct, frozen=True):
     """Time has passed; wanted at the latest when :class:`WakeAt` says, harmless at any other moment."""
 
 
-@dataclass(frozen=True, slots=True)
-class Heard:
+class Heard(msgspec.Struct, frozen=True):
     """A well-formed message arrived whose sender is the one its key names."""
 
     peer: str
@@ -28,8 +27,7 @@ class Heard:
     body: AnyBody
 
 
-@dataclass(frozen=True, slots=True)
-class Written:
+class Written(msgspec.Struct, frozen=True):
     """A :class:`Persist` has been carried out, or could not be."""
 
     token: int
@@ -37,15 +35,13 @@ class Written:
     """Why the content may not be on disk; empty: it is, and stays there if the power fails now."""
 
 
-@dataclass(frozen=True, slots=True)
-class Say:
+class Say(msgspec.Struct, frozen=True):
     """Publish this to all."""
 
     body: AnyBody
 
 
-@dataclass(frozen=True, slots=True)
-class Persist:
+class Persist(msgspec.Struct, frozen=True):
     """Put this on disk, in place of what was there; then, and not before, :class:`Written` with the same token.
 
     Whole or not at all: written to a file beside it, synchronised, renamed, the folder synchronised. One is under way
@@ -56,15 +52,13 @@ class Persist:
     token: int
 
 
-@dataclass(frozen=True, slots=True)
-class WakeAt:
+class WakeAt(msgspec.Struct, frozen=True):
     """Send :class:`Tick` at this time; infinite: not before something else happens. Replaces the one before."""
 
     time_s: float
 
 
-@dataclass(frozen=True, slots=True)
-class Note:
+class Note(msgspec.Struct, frozen=True):
     """One sentence for the log."""
 
     level: Literal["info", "warning", "error"]
