@@ -185,7 +185,7 @@ def live(
         links = LinkFilter(LinkTable(folder / LINKS, peers), name, inbox.put, mission.seed)
         links.watch()
         deliver = links.deliver
-    bus = ZenohBus.open(mission.team, name, mission.entry(name).endpoint, endpoints, deliver)
+    bus = ZenohBus.open(mission.team, name, mission.entry(name).endpoint, endpoints, deliver, kinds=role.hears)
     try:
         shell = PeerShell(
             role,

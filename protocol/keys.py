@@ -16,7 +16,7 @@ OPERATOR = "operator"
 ALIVE = "alive"
 """Kind of a liveliness token."""
 
-ADDRESSED_KINDS = frozenset({"vote"})
+ADDRESSED_KINDS = frozenset({"vote", "range_reply"})
 """Kinds that are said to one peer. Whoever else listens to all keys hears them too."""
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,31}\Z")

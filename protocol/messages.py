@@ -584,6 +584,15 @@ PERIODIC_KINDS: Final = frozenset(
 """Kinds of which only the latest matters: it says all that the ones before said."""
 
 
+STANDING_KINDS: Final = frozenset(
+    {"heartbeat", "state", "intent", "deployment", "topology", "confirmation", "range_digest"}
+)
+"""Kinds that are said again and again, so that who joins late hears them soon; who asks is answered at once."""
+
+STANDS_FOR_S: Final = 2.0
+"""What was said so long ago, and not again, does not stand any more: each kind is repeated at least once a second."""
+
+
 class Envelope(msgspec.Struct, frozen=True, kw_only=True):
     """One message as it stands on the wire."""
 
@@ -617,7 +626,9 @@ def kind_of(body: Body) -> str:
 
 def addressee_of(body: Body) -> str:
     """The peer that a body is for, which its key names behind the kind; empty: all."""
-    return body.candidate if isinstance(body, Vote) else ""
+    if isinstance(body, Vote):
+        return body.candidate
+    return body.asker if isinstance(body, RangeReply) else ""
 
 
 _encoder = msgspec.json.Encoder()

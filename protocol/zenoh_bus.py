@@ -1,64 +1,76 @@
-"""The bus between processes: a zenoh session of its own for each peer, with every setting that zenoh 1.10 needs.
+"""The bus between processes: a zenoh session of its own for each peer (:mod:`protocol.zenoh_settings`).
 
-What the settings are for:
-
-- Peers do not relay, and a link found by gossip is never dialled again after a cut. So multicast and gossip are off,
-  every peer knows the whole roster, and goes on dialling for as long as it lives. Good to about 40 peers.
-- Of two peers only one dials the other. When both do, and one of them is stopped for longer than the lease (a signal, a
-  suspended machine), the other's new link can arrive before the old ones are seen to be gone; zenoh then adds it to
-  what is a new session for the other side only, declares nothing there, and one of the two no longer hears the other,
-  or never sees its token again. Measured: after one in ten of 80 such stops, and after none of 100 with one dialler.
-- A process that ends takes its token with it within milliseconds; one that is stopped or cut off, within the lease of
-  1 s (zenoh's own default is 10 s).
-- A peer that vanishes silently can stop the reception of the survivors for 10 s when few threads receive
-  (zenoh#2718); hence ``ZENOH_RUNTIME``, which is read when zenoh is first used.
-- All is sent with congestion control DROP: to block would stall the sender for 5 s when one listener is stuck, and
-  everything that matters is said again. Deployments overtake the rest.
-- Shared memory is off: what a killed process leaves behind there, nobody tidies up.
+- *Who hears what* is declared to zenoh, one expression for each kind of message, so that nobody is sent what it would
+  throw away; operators hear everything.
+- *What arrives* waits in rings of zenoh's, one for each expression, out of which the newest push the oldest; so a
+  flood costs only its own kind. A thread of ours empties them all every few milliseconds: to wake a thread costs as
+  much as to hear a message, and zenoh must not be called from its own threads.
+- *What is sent* is sent with congestion control DROP: to block would stall the sender for 5 s when one listener is
+  stuck, and everything that matters is said again. Deployments overtake the rest.
+- *Whoever joins late asks*: when it sees the token of a peer it queries that peer's keys, and is answered with what the
+  peer has said last of each standing kind, byte for byte. The answers are delivered like publications, so that whatever
+  is old or double is dropped as always. Nothing is missed in between: zenoh tells the other side of our subscriptions
+  before it passes on the query. Other programs may ask in the same way at any time, ``get("<team>/v1/**")``.
 """
 
 from __future__ import annotations
 
-import json
-import os
-import re
 import secrets
 import socket
 import threading
-from collections.abc import Sequence
-from typing import Any
-
-os.environ.setdefault("ZENOH_RUNTIME", "(rx: (worker_threads: 16))")
+import time
+import traceback
+from collections import deque
+from collections.abc import Callable, Collection, Sequence
+from typing import Any, Final, TypeAlias
 
 import zenoh
 
 from protocol import keys
 from protocol.bus import Deliver, PeerAppeared, PeerVanished, Received
-from protocol.messages import MAXIMUM_PAYLOAD_BYTES
+from protocol.messages import MAXIMUM_PAYLOAD_BYTES, STANDING_KINDS, STANDS_FOR_S, Goal
+from protocol.zenoh_settings import BusUnavailable, open_session
 
-LEASE_MS = 1000
-CLOSE_WITHIN_S = 1.0
+__all__ = ["BusUnavailable", "ZenohBus", "free_endpoints"]
+
+CLOSE_WITHIN_S: Final = 1.0
 """zenoh waits up to 10 s for a listener that is stuck; the token is gone by then, and the process may end."""
 
-_ENDPOINT = re.compile(r"(?P<transport>[a-z]+)/(?P<host>[^/?#]+):(?P<port>[0-9]{1,5})(?P<rest>[?#].*)?\Z")
+READ_EVERY_S: Final = 0.005
+"""Between two looks at what has arrived."""
 
+MOST_WAITING: Final = 1024
+"""Messages of one expression that wait to be read."""
 
-class BusUnavailable(ValueError):
-    """A session cannot be opened; the text says what is in the way and what to do about it."""
+ANSWER_WITHIN_S: Final = 1.0
+"""Answers that come later are not waited for: by then all has been said again."""
+
+OPERATORS_KIND: Final = str(Goal.__struct_config__.tag)
+"""The only one that operators say."""
+
+Take: TypeAlias = Callable[[], Any]
+"""The next thing that has arrived somewhere, or None."""
 
 
 class ZenohBus:
     """The connection of one peer, or of one operator, to its team. Made by :meth:`open`."""
 
-    def __init__(self, session: Any, team: str, name: str, deliver: Deliver) -> None:
+    def __init__(self, session: Any, team: str, name: str, deliver: Deliver, kinds: frozenset[str] | None) -> None:
         self.team = team
         self.name = name
         self.dropped = 0
         """Publications that were not sent because the bus was closed, or refused because they were too long."""
         self._session = session
         self._deliver = deliver
+        self._kinds = kinds
         self._open = True
         self._declared: list[Any] = []
+        self._sources: list[tuple[Take, Callable[[Any], None]]] = [(self._next_answer, self._hear_answer)]
+        """What arrives, and what to do with it."""
+        self._answers: deque[Any] = deque(maxlen=MOST_WAITING)
+        """To our queries. No ring: what waits in one is lost when the query is over."""
+        self._said: dict[str, tuple[float, bytes]] = {}
+        """Of each standing key when it was said last, and what."""
         self._leaving = threading.Event()
         self._left = threading.Event()
 
@@ -72,6 +84,7 @@ class ZenohBus:
         deliver: Deliver,
         *,
         operator: bool = False,
+        kinds: Collection[str] | None = None,
     ) -> ZenohBus:
         """Join a team. Returns at once; links come up as the others do, and :class:`PeerAppeared` tells when.
 
@@ -81,8 +94,9 @@ class ZenohBus:
             listen: endpoint for others to dial, e.g. ``tcp/127.0.0.1:17447``; None if none shall.
             connect: endpoints of the team; none needs to be up. If ``listen`` is among them, they are taken for the
                 roster that all have, and only those after it in alphabetical order are dialled.
-            deliver: called from zenoh's threads with all that others say, and with the coming and going of peers.
-            operator: join as an operator: hear everything, have no token.
+            deliver: called from a thread of the bus with all that others say, and with the coming and going of peers.
+            operator: join as an operator: have no token, and answer no queries.
+            kinds: kinds of messages that are heard, of those for one peer only what is for this one; None: everything.
 
         Raises:
             BusUnavailable: a name or an endpoint is malformed, or the port to listen on cannot be had.
@@ -93,29 +107,26 @@ class ZenohBus:
                     f"'{text}' cannot be the name of a {what}: use up to 32 lower-case letters, digits and _, "
                     f"a letter first, and not '{keys.OPERATOR}'"
                 )
-        for endpoint in [*connect, *([] if listen is None else [listen])]:
-            _check_endpoint(endpoint)
-        others = [endpoint for endpoint in connect if listen is None or listen not in connect or endpoint > listen]
-        try:
-            session = zenoh.open(_configuration(listen, others))
-        except zenoh.ZError as problem:
-            raise BusUnavailable(_explanation(listen, others, str(problem))) from problem
-        bus = cls(session, team, name, deliver)
-        bus._declare(token=not operator)
-        threading.Thread(target=bus._leave, name="zenoh bus leaves", daemon=True).start()
+        bus = cls(open_session(listen, connect), team, name, deliver, None if kinds is None else frozenset(kinds))
+        bus._declare(peer=not operator)
+        reader = threading.Thread(target=bus._read, name="zenoh bus reads", daemon=True)
+        reader.start()
+        threading.Thread(target=bus._leave, args=(reader,), name="zenoh bus leaves", daemon=True).start()
         threading.Thread(target=bus._close_with_main_thread, name="zenoh bus ends").start()
         return bus
 
     def publish(self, key: str, payload: bytes) -> None:
-        """Send to all that are linked now; what does not fit into the queue to one of them is dropped there."""
-        urgent = key.endswith("/deployment")
+        """Send to all that are linked now and listen; what does not fit into the queue to one of them is dropped."""
+        kind, _ = keys.route(key)
+        if kind in STANDING_KINDS:
+            self._said[key] = (time.monotonic(), payload)
         try:
             self._session.put(
                 key,
                 payload,
                 encoding=zenoh.Encoding.APPLICATION_JSON,
                 congestion_control=zenoh.CongestionControl.DROP,
-                priority=zenoh.Priority.INTERACTIVE_HIGH if urgent else zenoh.Priority.DATA,
+                priority=zenoh.Priority.INTERACTIVE_HIGH if kind == "deployment" else zenoh.Priority.DATA,
             )
         except zenoh.ZError:  # the session is closed
             self.dropped += 1
@@ -126,33 +137,53 @@ class ZenohBus:
         self._leaving.set()
         self._left.wait(CLOSE_WITHIN_S)
 
-    def _declare(self, *, token: bool) -> None:
-        session = self._session
-        self._declared.append(
-            session.declare_subscriber(keys.everything(self.team), self._hear, allowed_origin=zenoh.Locality.REMOTE)
-        )
+    def _declare(self, *, peer: bool) -> None:
+        session, remote = self._session, zenoh.Locality.REMOTE
+        for expression in _expressions(self.team, self.name, self._kinds):
+            self._listen(session.declare_subscriber(expression, _ring(), allowed_origin=remote), self._hear)
+        if peer:
+            own = keys.Address(self.team, self.name, "*").key
+            self._listen(session.declare_queryable(own, _ring(), allowed_origin=remote), self._answer)
         liveliness = session.liveliness()
-        self._declared.append(liveliness.declare_subscriber(keys.tokens(self.team), self._notice, history=True))
-        if token:
-            own = keys.Address(self.team, self.name, keys.ALIVE).key
-            self._declared.append(liveliness.declare_token(own))
+        self._listen(liveliness.declare_subscriber(keys.tokens(self.team), _ring(), history=True), self._notice)
+        if peer:
+            alive = keys.Address(self.team, self.name, keys.ALIVE).key
+            self._declared.append(liveliness.declare_token(alive))
+
+    def _listen(self, declared: Any, handle: Callable[[Any], None]) -> None:
+        self._declared.append(declared)
+        self._sources.append((declared.handler.try_recv, handle))
 
     def _close_with_main_thread(self) -> None:
-        """Let no process wait for ever that ends without :meth:`close`.
-
-        zenoh calls back from Python threads that the interpreter waits for before it does anything else, functions of
-        ``atexit`` included. It waits for this thread as well, and starts no new ones by then.
-        """
+        """Take the token back when a process ends without :meth:`close`, before zenoh's threads are stopped anyhow."""
         threading.main_thread().join()
         self.close()
 
-    def _leave(self) -> None:
+    def _leave(self, reader: threading.Thread) -> None:
         """Wait for :meth:`close`, then do what may hang, in a thread that nobody waits for any longer than that."""
         self._leaving.wait()
+        reader.join()
         for declared in reversed(self._declared):  # the token first
             declared.undeclare()
         self._session.close()
         self._left.set()
+
+    def _read(self) -> None:
+        """Look at what has arrived again and again, until the bus is closed."""
+        while self._open:
+            for take, handle in self._sources:
+                self._take_all(take, handle)
+            time.sleep(READ_EVERY_S)
+
+    def _take_all(self, take: Take, handle: Callable[[Any], None]) -> None:
+        for _ in range(MOST_WAITING):  # not without end, whoever floods it
+            item = take()
+            if item is None:
+                return
+            try:
+                handle(item)
+            except Exception:  # costs this item and not the hearing
+                traceback.print_exc()
 
     def _hear(self, sample: Any) -> None:
         if not self._open or sample.kind != zenoh.SampleKind.PUT:
@@ -166,8 +197,62 @@ class ZenohBus:
         address = keys.parse(str(sample.key_expr))
         if not self._open or address is None or address.speaker == self.name:
             return
-        appeared = sample.kind == zenoh.SampleKind.PUT
-        self._deliver(PeerAppeared(address.speaker) if appeared else PeerVanished(address.speaker))
+        if sample.kind == zenoh.SampleKind.PUT:
+            self._deliver(PeerAppeared(address.speaker))
+            self._ask(address.speaker)
+        else:
+            self._deliver(PeerVanished(address.speaker))
+
+    def _ask(self, peer: str) -> None:
+        """Ask a peer for its standing words."""
+        if self._kinds is not None and not self._kinds & STANDING_KINDS:
+            return
+        self._session.get(
+            keys.Address(self.team, peer, "*").key,
+            zenoh.handlers.Callback(self._answers.append, indirect=False),  # no thread for each query
+            target=zenoh.QueryTarget.ALL,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            timeout=ANSWER_WITHIN_S,
+            congestion_control=zenoh.CongestionControl.DROP,
+            allowed_destination=zenoh.Locality.REMOTE,
+        )
+
+    def _answer(self, query: Any) -> None:
+        """Say the standing words that a query asks for to whoever asks."""
+        now_s = time.monotonic()
+        with query:
+            for key, (said_s, payload) in tuple(self._said.items()):
+                if now_s - said_s < STANDS_FOR_S and query.key_expr.intersects(zenoh.KeyExpr(key)):
+                    query.reply(
+                        key,
+                        payload,
+                        encoding=zenoh.Encoding.APPLICATION_JSON,
+                        congestion_control=zenoh.CongestionControl.DROP,
+                    )
+
+    def _next_answer(self) -> Any:
+        return self._answers.popleft() if self._answers else None
+
+    def _hear_answer(self, reply: Any) -> None:
+        sample = reply.ok
+        if sample is not None and (self._kinds is None or keys.route(str(sample.key_expr))[0] in self._kinds):
+            self._hear(sample)
+
+
+def _ring() -> Any:
+    return zenoh.handlers.RingChannel(MOST_WAITING)
+
+
+def _expressions(team: str, name: str, kinds: Collection[str] | None) -> list[str]:
+    """What to subscribe to, to hear these kinds and nothing else."""
+    if kinds is None:
+        return [keys.everything(team)]
+    return [
+        keys.Address(
+            team, "*", kind, operator=kind == OPERATORS_KIND, to=name if kind in keys.ADDRESSED_KINDS else ""
+        ).key
+        for kind in sorted(kinds)
+    ]
 
 
 def free_endpoints(count: int) -> list[str]:
@@ -193,44 +278,3 @@ def free_endpoints(count: int) -> list[str]:
     if len(endpoints) < count:
         raise BusUnavailable(f"only {len(endpoints)} of {count} ports are free on 127.0.0.1: end some other programs")
     return endpoints
-
-
-def _configuration(listen: str | None, others: Sequence[str]) -> Any:
-    settings = {
-        "mode": "peer",
-        # Never with zeros in front: zenoh prints those ids short and then does not know them again.
-        "id": f"1{secrets.token_hex(14)}1",
-        "listen/endpoints": [] if listen is None else [listen],
-        "connect/endpoints": list(others),
-        "connect/timeout_ms": -1,
-        "connect/exit_on_failure": False,
-        "connect/retry": {"period_init_ms": 200, "period_max_ms": 500, "period_increase_factor": 2},
-        "open/return_conditions": {"connect_scouted": False, "declares": False},
-        "scouting/multicast/enabled": False,
-        "scouting/gossip/enabled": False,
-        "transport/link/tx/lease": LEASE_MS,
-        "transport/link/tx/keep_alive": 4,
-        "transport/link/rx/max_message_size": 2 * MAXIMUM_PAYLOAD_BYTES,
-        "transport/shared_memory/enabled": False,
-    }
-    configuration = zenoh.Config()
-    for place, value in settings.items():
-        configuration.insert_json5(place, json.dumps(value))
-    return configuration
-
-
-def _check_endpoint(endpoint: str) -> None:
-    match = _ENDPOINT.match(endpoint)
-    if match is None or not 0 < int(match["port"]) < 65536:
-        raise BusUnavailable(f"'{endpoint}' is no endpoint: write it as tcp/HOST:PORT, e.g. tcp/127.0.0.1:17447")
-
-
-def _explanation(listen: str | None, others: Sequence[str], problem: str) -> str:
-    if "Address already in use" in problem:
-        return f"port of {listen} is taken by another program: end that program or choose another port"
-    if "Cannot assign requested address" in problem:
-        return f"{listen} is no address of this machine: listen on one of its own, e.g. 127.0.0.1"
-    if "Permission denied" in problem:
-        return f"{listen} may not be listened on by this user: choose a port above 1023"
-    endpoints = ", ".join([*([] if listen is None else [listen]), *others])
-    return f"zenoh cannot use the endpoints {endpoints}: {problem.split(' at /')[0]}"

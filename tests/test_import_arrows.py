@@ -27,7 +27,7 @@ RECORDINGS = {
     "launcher/review.py",
 }
 GATES = {
-    "zenoh": {"protocol/zenoh_bus.py", "protocol/security.py"},
+    "zenoh": {"protocol/zenoh_bus.py", "protocol/zenoh_settings.py", "protocol/security.py"},
     "rerun": RECORDINGS,
     "rerun_bindings": RECORDINGS,
 }
