@@ -135,9 +135,7 @@ class Allegiance:
                 self._membership_s = self.membership.due_s
             else:
                 self._join(self.membership.handle(core.Heard(peer, incarnation, body), now_s))
-            if isinstance(body, Vote | VoteRequest) and not (
-                now_s < self._election_s and isinstance(body, Vote) and self.election.overhear(peer, body, now_s)
-            ):
+            if isinstance(body, Vote | VoteRequest):
                 word = core.Heard(peer, incarnation, body)
         elif isinstance(event, PeerAppeared | PeerVanished):
             self._join(self.membership.handle(event, now_s))

@@ -56,6 +56,16 @@ class Ballot:
         """Count a vote that was given at or after this time."""
         self._voted_s[voter] = max(time_s, self._voted_s.get(voter, -math.inf))
 
+    @property
+    def asked_last_s(self) -> float:
+        """When the last round was asked; minus infinity before there is one."""
+        return next(reversed(self._asked_s.values()), -math.inf)
+
+    def is_answered(self, now_s: float) -> bool:
+        """Whether the last round has been answered by all who have voted within the lease."""
+        asked_s = self.asked_last_s
+        return all(at_s >= asked_s or at_s + self._lease_s <= now_s for at_s in self._voted_s.values())
+
     def is_cast_by(self, voter: str) -> bool:
         """Whether this voter has voted."""
         return voter in self._voted_s

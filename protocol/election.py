@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from random import Random
 from typing import Final, TypeAlias
 
-from protocol.ballot import Ballot
+from protocol.ballot import CAUTION, Ballot
 from protocol.core import Heard, Note, Persist, Say, Tick, WakeAt, Written
 from protocol.election_states import TRANSITIONS, Occurrence, Standing
 from protocol.messages import LastHeard, Reign, Vote, VoteRequest, Warrant
@@ -35,6 +35,12 @@ LEASE_S: Final = 1.0
 
 ROUND_S: Final = LEASE_S / 8
 """A candidate asks, and a leader renews its lease, once in this time: some loss costs no lease."""
+
+CALM_ROUND_S: Final = LEASE_S / 4
+"""A leader whose last round all have answered who vote for it loses nothing now, and asks again after this only."""
+
+URGENT_ROUND_S: Final = LEASE_S / 16
+"""A leader asks so often when half of its lease has gone by without enough answers."""
 
 CANDIDACY_S: Final = LEASE_S / 2
 """A candidate that has not won by then gives back the promises that it has, so that others may try."""
@@ -100,7 +106,8 @@ class Election:
         self._ballot: Ballot | None = None
         self._canvass: Ballot | None = None
         self._highest_epoch = promise.epoch if promise else 0
-        self._marks: dict[str, str] = {}
+        self._marks: dict[str, tuple[str, float]] = {}
+        """The latest mark of each peer that has answered it, and when it came."""
         self._rounds = self._token = 0
         self._reply_to: tuple[str, str] = ("", "")
         """Candidate and correlation of the request whose promise is being written."""
@@ -121,7 +128,7 @@ class Election:
                 if peer in self._roster.voters and peer != self._name:
                     self._answer(Reign(epoch=request.epoch, leader=peer, incarnation=incarnation), request, now_s)
             case Heard(peer, _, Vote() as vote):
-                if peer in self._roster.names and peer != self._name:
+                if vote.candidate == self._name and peer in self._roster.names and peer != self._name:
                     self._count(peer, vote, now_s)
             case Written(token, failure):
                 if token == self._token and self._voter.writing is not None:
@@ -131,17 +138,6 @@ class Election:
         effects.append(WakeAt(self._next_wake_s(now_s)))
         return effects
 
-    def overhear(self, peer: str, vote: Vote, now_s: float) -> bool:
-        """Take note of a vote for somebody else, as most are; False: :meth:`handle` has to see it.
-
-        Does what :meth:`handle` would while nothing is due: such a vote has no effects, and changes no time.
-        """
-        if vote.candidate == self._name:
-            return False
-        if peer in self._roster.names and peer != self._name:
-            self._count(peer, vote, now_s)
-        return True
-
     def leads(self, now_s: float) -> bool:
         """Whether it holds an unexpired lease."""
         return self.office is not None and now_s < self.lease_until_s
@@ -150,8 +146,8 @@ class Election:
         """What goes with an order given now; None: no order may be given."""
         if not self.leads(now_s):
             return None
-        marks = {**self._marks, self._name: self.obedience.mark(now_s)}
-        heard = tuple(LastHeard(peer=peer, mark=mark) for peer, mark in marks.items())
+        marks = {**self._marks, self._name: (self.obedience.mark(now_s), now_s)}
+        heard = tuple(LastHeard(peer=peer, mark=mark, age_s=now_s - at_s) for peer, (mark, at_s) in marks.items())
         return Warrant(lease_s=self.lease_until_s - now_s, marks=heard)
 
     def _answer(self, reign: Reign, request: VoteRequest, now_s: float) -> None:
@@ -195,16 +191,17 @@ class Election:
                 self._go(Occurrence.OUTRANKED, now_s)
 
     def _count(self, peer: str, vote: Vote, now_s: float) -> None:
-        """Take note of a peer's mark and promise, and of its vote if it is one for this peer."""
-        self._marks[peer] = vote.mark
-        if self._canvass is not None and vote.granted and vote.candidate == self._name and peer in self._roster.voters:
+        """Take note of a peer's mark and promise, and of its vote if it has granted it."""
+        self._marks[peer] = (vote.mark, now_s)
+        granted = vote.granted and peer in self._roster.voters
+        if self._canvass is not None and granted:
             self._canvass.count(peer, vote.correlation)
             self._use_canvass(now_s)
         promise, ballot = vote.promise, self._ballot
         if promise is None or promise.epoch > self._highest_epoch + LARGEST_LEAP:
             return
         self._highest_epoch = max(self._highest_epoch, promise.epoch)
-        if vote.granted and vote.candidate == self._name and peer in self._roster.voters:
+        if granted:
             if ballot is not None and promise == ballot.reign:
                 ballot.count(peer, vote.correlation)
                 self._use_votes(now_s)
@@ -219,6 +216,8 @@ class Election:
         assert ballot is not None
         if ballot.reign == self.office:
             self.lease_until_s = max(self.lease_until_s, ballot.held_until_s)
+            if ballot.is_answered(now_s):
+                self._next_round_s = ballot.asked_last_s + CALM_ROUND_S
         elif ballot.wants_only(self._name, now_s):
             if self._voter.renew(ballot.reign, now_s):
                 ballot.count_from(self._name, now_s)
@@ -315,7 +314,8 @@ class Election:
         ballot.ask(correlation, now_s)
         warrant = self.warrant(now_s) if ballot.reign == self.office else None
         self._effects.append(Say(VoteRequest(epoch=ballot.reign.epoch, correlation=correlation, warrant=warrant)))
-        self._next_round_s = now_s + ROUND_S
+        urgent = self.office is not None and self.lease_until_s - now_s < CAUTION * LEASE_S / 2
+        self._next_round_s = now_s + (URGENT_ROUND_S if urgent else ROUND_S)
         if warrant is not None:
             self.obedience.heed(ballot.reign, warrant, now_s)
         self._use_votes(now_s)

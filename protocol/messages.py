@@ -245,6 +245,8 @@ class LastHeard(msgspec.Struct, frozen=True, kw_only=True):
 
     peer: Name
     mark: Correlation
+    age_s: Seconds = 0.0
+    """How long before it spoke it had heard it."""
 
 
 class Warrant(msgspec.Struct, frozen=True, kw_only=True):
@@ -252,6 +254,7 @@ class Warrant(msgspec.Struct, frozen=True, kw_only=True):
 
     Obey for ``lease_s`` from when you said the mark of yours that is in ``marks``, and not at all without one of this
     incarnation. The leader had heard that mark before it spoke, so that delay makes orders run out sooner, not later.
+    Nine tenths of ``lease_s`` and the mark's ``age_s`` together will do as well, if that is longer.
     """
 
     lease_s: Seconds
@@ -582,7 +585,6 @@ PERIODIC_KINDS: Final = frozenset(
     }
 )  # fmt: skip
 """Kinds of which only the latest matters: it says all that the ones before said."""
-
 
 STANDING_KINDS: Final = frozenset(
     {"heartbeat", "state", "intent", "deployment", "topology", "confirmation", "range_digest"}

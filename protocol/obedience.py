@@ -6,6 +6,9 @@ the latest mark that it had heard of each peer, and says how much of its lease w
 from when it *said* the mark. The order was given after that, so that this ends no later than the leader's lease,
 however long the order was on its way, by all clocks within :data:`protocol.ballot.CLOCK_DRIFT`. Hence at any moment
 all who obey anybody obey one and the same leader.
+
+A mark that the leader has had for a while was said before that while, so that the rest may be counted from when the
+leader *heard* it. Two clocks measure that longer time, and :data:`~protocol.ballot.CAUTION` covers what they differ by.
 """
 
 from __future__ import annotations
@@ -132,5 +135,6 @@ class Obedience:
     def _end_s(self, warrant: Warrant) -> float:
         for heard in warrant.marks:
             if heard.peer == self._name:
-                return self._said_s.get(heard.mark, -math.inf) + min(warrant.lease_s, self._most_s)
+                rest_s = max(warrant.lease_s, CAUTION * (warrant.lease_s + heard.age_s))
+                return self._said_s.get(heard.mark, -math.inf) + min(rest_s, self._most_s)
         return -math.inf

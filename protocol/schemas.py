@@ -72,7 +72,10 @@ SPEAKERS: Final = {
     "goal": ("an operator", "when a person wants; again until replied"),
     "goal_reply": ("tracked agent", "for each goal heard"),
     "deployment": ("the leader", "with every decision, and again while it holds"),
-    "vote_request": ("who stands for leader, and the leader", "eight times in a lease"),
+    "vote_request": (
+        "who stands for leader, and the leader",
+        "eight times in a lease; the leader four times, as long as all answer",
+    ),
     "vote": ("every peer, to who asked", "for each vote request heard"),
     "topology": ("the leader", "four times a second, and with every change"),
     "confirmation": (
@@ -111,7 +114,9 @@ EXAMPLES: Final[tuple[AnyBody, ...]] = (
     GoalReply(correlation="5f2c9a", accepted=True),
     Deployment(
         authority=Authority(epoch=1, leader="base", sequence=42),
-        warrant=Warrant(lease_s=0.71, marks=(LastHeard(peer="base", mark="0.9"), LastHeard(peer="robot1", mark="0.7"))),
+        warrant=Warrant(
+            lease_s=0.71, marks=(LastHeard(peer="base", mark="0.9"), LastHeard(peer="robot1", mark="0.7", age_s=0.19))
+        ),
         decision=7,
         placements=(
             Placement(robot="robot1", position=(7.0, 3.0), cell=118),
@@ -149,7 +154,8 @@ EXAMPLES: Final[tuple[AnyBody, ...]] = (
         epoch=3,
         correlation="0.57",
         warrant=Warrant(
-            lease_s=0.84, marks=(LastHeard(peer="base", mark="0.56"), LastHeard(peer="robot1", mark="1.203"))
+            lease_s=0.65,
+            marks=(LastHeard(peer="base", mark="0.56", age_s=0.247), LastHeard(peer="robot1", mark="1.203")),
         ),
     ),
     Vote(
@@ -204,215 +210,6 @@ EXAMPLES: Final[tuple[AnyBody, ...]] = (
             Placement(robot="robot1", position=(7.0, 3.0)),
             Placement(robot="robot2", position=(9.0, 2.5)),
         ),
-        standing=("robot1",),
-    ),
-    Bid(
-        epoch=3,
-        auction=5,
-        offers=(
-            Offer(
-                aim=0,
-                whole=True,
-                total_cost_m=14.2,
-                cost=2.1,
-                relays=(
-                    Placement(robot="robot1", position=(7.0, 3.0), cell=118),
-                    Placement(robot="robot2", position=(9.0, 5.0), cell=121),
-                ),
-                removed=("robot1", "agent"),
-                added=("robot1", "robot2"),
-            ),
-        ),
-    ),
-    RangeRequest(position=(4.0, 2.5), correlation="17.204"),
-    RangeReply(asker="robot1", correlation="17.204", range_m=5.13, bound_m=0.2),
-    Ranges(
-        ranges=(
-            SharedRange(
-                owner="robot1", start=0, number=204, time_s=51.25, anchor=(4.0, 2.5), range_m=5.13, bound_m=0.204
-            ),
-        )
-    ),
-    RangeDigest(
-        clock_s=51.5,
-        heard=(
-            HeardRanges(owner="base", start=0, below=207),
-            HeardRanges(owner="robot1", start=0, below=203, beyond=(204,)),
-        ),
-    ),
-    RangeBase(
-        time_s=48.75,
-        owner="robot1",
-        start=0,
-        number=194,
-        heard=(HeardRanges(owner="base", start=0, below=196), HeardRanges(owner="robot1", start=0, below=195)),
-        fingerprint=3141592653,
-        origin=(1.5, 1.0),
-        pieces=(ConvexPiece(corners=((7.1, 2.2), (7.4, 2.1), (7.5, 2.9)), checked_m=0.31),),
-        rings=(Ring(center=(2.5, 1.5), inner_m=4.93, outer_m=5.33),),
-        rejections=0,
-        anchor=(4.0, 2.5),
-        slack_m=0.24,
-    ),
-)
-
-PAGE: Final = """\
-# What the peers say
-
-Made by `make docs` from `protocol/messages.py`: change it there.
-
-Every peer is a zenoh peer and publishes JSON (encoding `application/json`) under keys of its own. Nothing but zenoh and
-a JSON reader is needed to listen in or to send a goal; [an example](../../examples/README.md) does both. Peers do not
-relay, so connect to the endpoint of each one that you want to hear: `runs/<name>/mission.json` lists them.
-
-## Keys
-
-{keys}
-
-`<team>`, `<peer>`, `<to>` and `<name>` are up to 32 lower-case letters, digits and `_`, a letter first; no peer is
-called `{operator}`. A message counts only if its `sender` is the one that its key names. What is said under a key that
-ends in `<to>` is for that peer; `<team>/{version}/**` brings you these too. A kind that is *latest only* says all that
-the ones before said: who is slow may skip to the last one. The rates are in the mission file.
-
-## Asking
-
-Who comes late need not wait until all has been said again. Every peer answers queries on its own keys with what it has
-said last, in the last {stands_for:g} seconds, of each standing kind:
-{standing}.
-
-```python
-config = zenoh.Config()
-config.insert_json5("connect/endpoints", json.dumps([peer["endpoint"] for peer in mission["roster"]]))
-with zenoh.open(config) as session:
-    for reply in session.get(f"{{mission['team']}}/{version}/**", target=zenoh.QueryTarget.ALL, timeout=1.0):
-        print(reply.ok.key_expr, json.loads(reply.ok.payload.to_bytes())["body"])
-```
-
-The answers are the messages themselves, with the key, `incarnation` and `sequence` under which they were said. Peers
-ask in the same way when they see another one's liveliness token.
-
-## Envelope
-
-Each payload is one envelope ([schema]({envelope}.schema.json)), at most {limit} bytes long.
-
-{envelope_fields}
-
-Kinds can overtake one another on the way, and anything can be lost or come twice. To tell old from new, compare
-(`incarnation`, `sequence`) with the last one of the same sender *and kind*.
-
-## Bodies
-
-{bodies}
-
-## Parts of bodies
-
-{parts}
-
-## Types
-
-{types}
-
-## Versions
-
-The `{version}` in the keys and `schema` in the envelope are one number. It rises when a change would mislead a reader
-of before: a field that goes, or that means something else. A reader refuses a schema that it does not know, and never
-sees one if it listens to `{version}` only. What it can do without is added under the same number: new kinds, and new
-fields with a default. So ignore kinds and fields that you do not know; the peers do.
-"""
-
-
-def documents() -> dict[str, str]:
-    """File name → text of everything that is published about the messages."""
-    texts = {f"{kind}.schema.json": _schema(body) for kind, body in BODIES.items()}
-    texts["envelope.schema.json"] = _schema(Envelope)
-    texts["README.md"] = _page()
-    return texts
-
-
-def example_payloads() -> dict[str, bytes]:
-    """Kind → a payload of that kind as it stands on the wire."""
-    return {
-        messages.kind_of(body): messages.encode(
-            Envelope(sender=_speaker(body), incarnation=0, sequence=311, sent_at_s=1767225600.25, body=body)
-        )
-        for body in EXAMPLES
-    }
-
-
-def _speaker(body: Body) -> str:
-    match body:
-        case Goal():
-            return "ada"
-        case Intent() | GoalReply() | RangeReply():
-            return "agent"
-        case Deployment():
-            return "base"
-        case VoteRequest() | Topology() | Auction():
-            return "robot2"
-        case _:
-            return "robot1"
-
-
-def _schema(struct: type[msgspec.Struct]) -> str:
-    schema = {"$schema": DIALECT, **msgspec.json.schema(struct)}
-    for name, definition in schema["$defs"].items():
-        definition["description"] = _plain(definition["description"])
-        meanings = {field: meaning for field, _, meaning in _fields(getattr(messages, name))}
-        for field, content in definition["properties"].items():
-            if meanings.get(field):
-                content["description"] = meanings[field]
-    return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
-
-
-def _page() -> str:
-    payloads = example_payloads()
-    rows: list[tuple[str, ...]] = []
-    for kind, body in BODIES.items():
-        speaker, rate = SPEAKERS[kind]
-        latest = "; latest only" if kind in PERIODIC_KINDS else ""
-        rows.append((f"`{_key(kind)}`", speaker, f"{rate}{latest}", f"[{_first_sentence(body)}](#{kind})"))
-    alive = keys.Address("<team>", "<peer>", keys.ALIVE).key
-    rows.append(
-        (f"`{alive}`", "every peer", "a liveliness token", "Its process is up: gone at its end, or 1 s after a cut")
-    )
-    bodies = [
-        f"### {kind}\n\n{_plain(inspect.getdoc(body) or '')} [Schema]({kind}.schema.json).\n\n"
-        f"{_field_table(body)}\n\n`{_key(kind)}`\n\n"
-        f"```json\n{_readable(payloads[kind])}\n```"
-        for kind, body in BODIES.items()
-    ]
-    parts = [
-        f"### {part.__name__}\n\n{_plain(inspect.getdoc(part) or '')}\n\n{_field_table(part)}"
-        for part in (
-            Authority,
-            Progress,
-            Motion,
-            MemberWay,
-            Placement,
-            Reign,
-            Warrant,
-            LastHeard,
-            Tree,
-            TreeProposal,
-            NewLink,
-            Milestone,
-            LinkView,
-            Offer,
-            Aim,
-            SharedRange,
-            HeardRanges,
-            ConvexPiece,
-            Ring,
-        )
-    ]
-    types: list[tuple[str, ...]] = [
-        (f"`{name}`", f"`{json.dumps(msgspec.json.schema(getattr(messages, name)))}`".replace("|", "\\|"), meaning)
-        for name, meaning in _aliases()
-    ]
-    return PAGE.format(
-        keys=_table(("key", "who", "how often", "what"), rows),
-        operator=keys.OPERATOR,
-        version=keys.VERSION,
         standing=("robot1",),
     ),
     Bid(

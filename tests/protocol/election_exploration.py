@@ -16,9 +16,8 @@ overlapping leases, unless the first gave its promise back; and, if no disk is l
 epochs. The first history that breaks a rule is the shortest.
 
 What a voter does on an event depends on its own state only, so that it is computed once for each state, event and
-time. States that behave alike from now on are one state. Left out is what no history needs: a voter hears the votes
-for itself only; a voter looks at its clock at once where that makes it say nothing and changes nobody it obeys; and
-time does not pass before the first candidacy.
+time. States that behave alike from now on are one state. Left out is what no history needs: a voter looks at its clock
+at once where that makes it say nothing and changes nobody it obeys; and time does not pass before the first candidacy.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ from random import Random
 from protocol.ballot import CLOCK_DRIFT
 from protocol.core import Heard, Persist, Say, Tick, WakeAt, Written
 from protocol.election import LEASE_S, Election, Event, Leads
-from protocol.messages import Authority, Reign, VoteRequest, Warrant
+from protocol.messages import Authority, Reign, VoteRequest, Warrant, addressee_of
 from protocol.promises import decode_promise
 from protocol.roster import Roster
 from protocol.simulated_bus import VirtualTime
@@ -166,7 +166,8 @@ class Team:
                 case Say(body):
                     if isinstance(body, VoteRequest) and body.warrant is not None:
                         assert peer.mind.leads(now_s), "a warrant is said outside a lease"
-                    self._send(peer, partial(self._hear, Heard(peer.name, incarnation, body)))
+                    hear = partial(self._hear, Heard(peer.name, incarnation, body))
+                    self._send(peer, hear, addressee_of(body))
                 case Persist(content, token):
                     peer.writing = content
                     self._later(self.disk_s, peer, partial(self._written, peer, content, token))
@@ -215,9 +216,11 @@ class Team:
             peer.taken, self.taken = order, self.taken + 1
             self.check()
 
-    def _send(self, sender: Peer, arrive: Callable[[Peer], None]) -> None:
+    def _send(self, sender: Peer, arrive: Callable[[Peer], None], to: str = "") -> None:
         for other in self.peers.values():
-            if other is sender or (sender.name, other.name) in self.cut or self._chance.random() < self.loss:
+            if other is sender or to not in ("", other.name):
+                continue
+            if (sender.name, other.name) in self.cut or self._chance.random() < self.loss:
                 continue
             for _ in range(1 + (self._chance.random() < self.loss / 2)):  # some arrive twice
                 self._later(self.delay_s, other, partial(self._arrive, other, partial(arrive, other)))

@@ -7,11 +7,12 @@ import re
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, rule
 
 from protocol import election, state_diagrams
+from protocol.ballot import CAUTION, CLOCK_DRIFT
 from protocol.core import Heard, Note, Persist, Say, Tick, WakeAt, Written
 from protocol.election import (
     LARGEST_LEAP,
@@ -25,7 +26,7 @@ from protocol.election import (
 )
 from protocol.election_states import TRANSITIONS, Occurrence, Standing
 from protocol.messages import Authority, Envelope, LastHeard, Reign, Vote, VoteRequest, Warrant, decode, encode
-from protocol.obedience import Obeys, ObeysNobody
+from protocol.obedience import Obedience, Obeys, ObeysNobody
 from protocol.promises import decode_promise
 from protocol.roster import Roster
 from tests.protocol.election_team import Peer, Team
@@ -228,6 +229,43 @@ def test_an_order_runs_out_by_the_clock_of_who_obeys_counted_from_its_mark() -> 
     authority, warrant = order(mark, lease_s=1e9, sequence=2)
     assert robot.obedience.take("deployment", authority, reign(5), warrant, 100.89) == ""
     assert robot.obedience.obeyed(100.91) is None, "nobody holds a lease for longer than a lease"
+
+
+def test_a_mark_that_the_leader_has_had_for_a_while_makes_an_order_last() -> None:
+    for age_s, until_s in ((0.0, 100.4), (0.01, 100.4), (0.4, 100.72), (9.0, 100.9)):
+        robot, mark = obedient(now_s=100.0)
+        heard = (LastHeard(peer="robot1", mark=mark, age_s=age_s),)
+        authority, _ = order(mark)
+        assert robot.obedience.take("deployment", authority, reign(5), Warrant(lease_s=0.4, marks=heard), 100.1) == ""
+        assert robot.obedience.until_s == pytest.approx(until_s), age_s
+
+
+def test_a_leader_says_how_long_ago_it_heard_a_mark() -> None:
+    base, persist = candidate_with_votes(now_s=0.1)
+    base.handle(Written(persist.token), 0.15)
+    base.handle(Heard("robot2", 0, Vote(candidate="base", correlation="0.9", granted=False, mark="0.7")), 0.2)
+    warrant = base.warrant(0.5)
+    assert warrant is not None
+    ages = {(heard.peer, heard.mark): heard.age_s for heard in warrant.marks}
+    own = next(mark for name, mark in ages if name == "base")
+    assert ages == pytest.approx({("base", own): 0.0, ("robot1", "0.1"): 0.4, ("robot2", "0.7"): 0.3})
+
+
+DRIFTS = st.sampled_from([1.0 - CLOCK_DRIFT, 1.0, 1.0 + CLOCK_DRIFT])
+
+
+@given(st.floats(-2.0, 0.9), st.floats(0.0, 2.0), st.floats(0.0, 2.0), DRIFTS, DRIFTS)
+def test_nobody_obeys_until_the_voters_are_free(
+    said_s: float, heard_after_s: float, given_after_s: float, leader: float, hearer: float
+) -> None:
+    """By true time, since a majority was asked that voted after that: it is bound for a lease by its fastest clock."""
+    given_s = said_s + heard_after_s + given_after_s
+    lease_s = CAUTION * LEASE_S - leader * given_s
+    assume(given_s >= 0.0 and lease_s > 0.0)
+    obedience = Obedience("robot1", 0, LEASE_S, None)
+    heard = LastHeard(peer="robot1", mark=obedience.mark(hearer * said_s), age_s=leader * given_after_s)
+    obedience.heed(reign(1), Warrant(lease_s=lease_s, marks=(heard,)), hearer * said_s)
+    assert obedience.until_s / hearer <= LEASE_S / (1.0 + CLOCK_DRIFT)
 
 
 def test_orders_that_are_not_taken() -> None:
