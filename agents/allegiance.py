@@ -42,8 +42,8 @@ class Allegiance:
         now_s: the present time.
     """
 
-    hears = frozenset({"vote", "vote_request", "heartbeat", "state", "intent"})
-    """The last two because whoever says anything lives: with some loss, heartbeats alone are too few to tell."""
+    hears = frozenset({"vote", "vote_request", "heartbeat", "state", "intent", "range_reply"})
+    """The last three because whoever says anything lives: with some loss, heartbeats alone are too few to tell."""
 
     def __init__(
         self,

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 from agents.mission import Mission
 from agents.records import Track
-from agents.rhythm import Rhythm
+from agents.rhythm import EARLY_S, Rhythm
 from agents.role import Effect, Publish, Record
 from protocol.messages import Heartbeat, Intent, RoleName, State
 
@@ -17,6 +19,8 @@ def silence_s(control_hz: float) -> float:
 class SelfReport:
     """Two rhythms: where the body is, at ``control_hz``, and that the mind is alive, at ``heartbeat_hz``.
 
+    Who says where it is lives; so a heartbeat is said only if nothing has been for as long as from one to the next.
+
     Args:
         mission: the rates.
         role: of the peer.
@@ -27,7 +31,10 @@ class SelfReport:
     def __init__(self, mission: Mission, role: RoleName, radius_m: float, now_s: float) -> None:
         self._role, self._radius_m = role, radius_m
         self._control = Rhythm(1.0 / mission.control_hz, now_s)
-        self._heartbeat = Rhythm(1.0 / mission.heartbeat_hz, now_s)
+        self._heartbeat_s = 1.0 / mission.heartbeat_hz
+        self._heartbeat = Rhythm(self._heartbeat_s, now_s)
+        self._said_s = -math.inf
+        """When it said last where the body is."""
 
     @property
     def next_s(self) -> float:
@@ -46,6 +53,7 @@ class SelfReport:
         effects: list[Effect] = []
         due = self._control.due(now_s)
         if (due or urgent) and not silent:
+            self._said_s = now_s
             effects.append(Publish(body))
         if due:
             track = Track(
@@ -58,6 +66,6 @@ class SelfReport:
                 path=body.path,
             )
             effects.append(Record(track))
-        if self._heartbeat.due(now_s):
+        if self._heartbeat.due(now_s) and now_s >= self._said_s + self._heartbeat_s - EARLY_S:
             effects.append(Publish(Heartbeat(role=self._role, mode=body.mode)))
         return effects

@@ -78,7 +78,7 @@ class Body(msgspec.Struct, frozen=True, kw_only=True, tag_field="kind"):
 
 
 class Heartbeat(Body, frozen=True, kw_only=True, tag="heartbeat"):
-    """The sender's event loop is alive. Sent by every peer at ``heartbeat_hz``."""
+    """The sender's event loop is alive. Said at ``heartbeat_hz`` by who has not said where it is meanwhile."""
 
     role: RoleName
     mode: Mode

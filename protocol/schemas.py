@@ -66,7 +66,7 @@ from protocol.messages import (
 DIALECT: Final = "https://json-schema.org/draft/2020-12/schema"
 
 SPEAKERS: Final = {
-    "heartbeat": ("every peer", "at `heartbeat_hz`"),
+    "heartbeat": ("every peer", "at `heartbeat_hz`, unless it has said `state` or `intent` since the last one was due"),
     "state": ("base station, robots", "at `control_hz`, and with every change of progress"),
     "intent": ("a tracked agent that announces", "at `control_hz`"),
     "goal": ("an operator", "when a person wants; again until replied"),

@@ -463,7 +463,7 @@ def test_a_decision_carries_its_cost_and_the_bound(team: Team) -> None:
 def test_says_where_it_is_and_that_it_lives(team: Team) -> None:
     team.go_on(2.0)
     assert len(team.all_said(State)) == 21
-    assert len(team.all_said(Heartbeat)) == 5
+    assert not team.all_said(Heartbeat), "whoever says where it is lives"
     assert sum(isinstance(record, Track) for record in team.records) == 21
     assert {body.position for _, body in team.all_said(State)} == {START}
 

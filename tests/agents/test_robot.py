@@ -118,7 +118,7 @@ def test_waits_and_says_so_until_it_hears_orders(life: Life) -> None:
     assert state(life).mode == "waiting"
     assert life.driver.pose() == (0.0, 0.0)
     assert sum(isinstance(body, State) for _, body in life.said) == 21
-    assert sum(isinstance(body, Heartbeat) for _, body in life.said) == 5
+    assert not any(isinstance(body, Heartbeat) for _, body in life.said), "whoever says where it is lives"
     assert len(tracks(life)) == 21
 
 

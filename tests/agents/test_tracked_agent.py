@@ -68,7 +68,7 @@ def test_announces_where_it_is_and_its_way_there(corner: Environment) -> None:
     assert intent.position == life.driver.pose() == intent.path[0]
     assert intent.path[-1] == (2.0, 9.0)
     assert len(life.all_said(Intent)) == 21
-    assert len(life.all_said(Heartbeat)) == 5
+    assert not life.all_said(Heartbeat), "whoever says where it is lives"
     assert sum(isinstance(record, Track) for record in life.records) == 21
 
 
