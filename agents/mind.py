@@ -11,7 +11,7 @@ something to do names a time that has passed, and is woken at once.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Protocol, TypeAlias
 
 from agents.role import RETRY_S, Effect, Event, Heard, WakeAt, Woken
@@ -33,8 +33,10 @@ class Part(Protocol):
         """Effects of one event, without a :class:`~agents.role.WakeAt`. The first event of all is being woken."""
 
 
-Turn: TypeAlias = tuple[Part, bool, bool]
-"""A part at an event: whether it is given the event, and whether it has a time to be asked for."""
+Handle: TypeAlias = Callable[[Event, float], Iterable[Effect]]
+
+Turn: TypeAlias = tuple[Part, Handle | None, bool]
+"""A part at an event: what takes the event, if it is given it, and whether it has a time to be asked for."""
 
 
 class Mind:
@@ -61,27 +63,27 @@ class Mind:
         """
         failure: Exception | None = None
         wake_s = math.inf
-        for part, handles, wakes in self._turns(event):
-            if handles:
+        turns = self._hearers.get(event.address.kind, self._others) if isinstance(event, Heard) else self._all
+        for part, handle, wakes in turns:
+            if handle is not None:
                 try:
-                    effects = part.handle(event, now_s)
+                    effects = handle(event, now_s)
                     if effects:
                         yield from effects
                 except Exception as problem:
                     failure = problem
                     wake_s = min(wake_s, now_s + RETRY_S)
                     continue
-            if wakes and (next_s := part.next_s) < wake_s:
-                wake_s = next_s
-        yield WakeAt(max(now_s, wake_s))
+            if wakes:
+                next_s = part.next_s
+                if next_s < wake_s:
+                    wake_s = next_s
+        yield WakeAt(wake_s if wake_s > now_s else now_s)
         if failure is not None:
             raise failure
-
-    def _turns(self, event: Event) -> Sequence[Turn]:
-        return self._hearers.get(event.address.kind, self._others) if isinstance(event, Heard) else self._all
 
     def _plan(self, handles: Sequence[bool]) -> tuple[Turn, ...]:
         """Turns of all parts that handle an event or have a time of their own, as most parts have."""
         wakes = [getattr(type(part), "next_s", None) != math.inf for part in self.parts]
         turns = zip(self.parts, handles, wakes, strict=True)
-        return tuple((part, handle, wake) for part, handle, wake in turns if handle or wake)
+        return tuple((part, part.handle if handle else None, wake) for part, handle, wake in turns if handle or wake)

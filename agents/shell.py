@@ -35,16 +35,38 @@ from agents.role import (
 )
 from protocol.bus import Bus, BusEvent, PeerAppeared, PeerVanished, Received
 from protocol.keys import Address, parse, route
-from protocol.messages import Envelope, Goal, MalformedMessage, addressee_of, decode, encode, kind_of
+from protocol.messages import AnyBody, Envelope, Goal, MalformedMessage, addressee_of, decode, encode, kind_of
 
 MAXIMUM_OPERATORS: Final = 64
 """Operators remembered at a time. Their names are not on the roster, so that the memory must be bounded."""
 
 _address: Final = lru_cache(maxsize=1024)(parse)
+_route: Final = lru_cache(maxsize=1024)(route)
 """The same few keys come again and again."""
 
 Refusal: TypeAlias = str
 """Why a publication was not heard: it is foreign, malformed, impersonated, misplaced or stale, or of a stranger."""
+
+_NOTHING: Final = (-1, -1)
+"""Before all incarnations and sequences."""
+
+
+def read(publication: Received) -> Heard | Refusal:
+    """The message of a publication, or what is wrong with it whoever hears it."""
+    address = _address(publication.key)
+    if address is None:
+        return "foreign"
+    try:
+        envelope = decode(publication.payload)
+    except MalformedMessage:
+        return "malformed"
+    if envelope.sender != address.speaker:
+        return "impersonated"
+    if envelope.kind != address.kind or addressee_of(envelope.body) != address.to:
+        return "misplaced"
+    if isinstance(envelope.body, Goal) is not address.operator:
+        return "misplaced"
+    return Heard(address, envelope)
 
 
 class PeerShell:
@@ -62,7 +84,7 @@ class PeerShell:
         record: puts a record of this peer into the recording: ``record(time_s, record)``.
         execute: starts a computation, which is to end in :meth:`finish`. Must not call it before it returns.
         persist: puts a promise on disk, which is to end in :meth:`written`, likewise not before it returns.
-        decode: envelope of a payload; in simulation all peers share what one of them has decoded.
+        read: :func:`read`; in simulation all peers share what one of them has read.
     """
 
     def __init__(
@@ -80,7 +102,7 @@ class PeerShell:
         record: Callable[[float, AnyRecord], None],
         execute: Callable[[Compute], None],
         persist: Callable[[Persist], None],
-        decode: Callable[[bytes], Envelope] = decode,
+        read: Callable[[Received], Heard | Refusal] = read,
     ) -> None:
         self.wake_at_s = math.inf
         """Mission time at which :meth:`wake` is due."""
@@ -100,7 +122,7 @@ class PeerShell:
         self._record = record
         self._execute = execute
         self._persist = persist
-        self._decode = decode
+        self._read = read
         self._sequence = 0
         self._heard: dict[tuple[str, str], tuple[int, int]] = {}
         self._incarnations: dict[str, int] = {}
@@ -118,11 +140,11 @@ class PeerShell:
     def take(self, event: BusEvent) -> None:
         """Pass an event of the bus on to the role, if it is fit for it."""
         if isinstance(event, Received):
-            kind, to = route(event.key)
+            kind, to = _route(event.key)
             if kind not in self._role.hears or to not in ("", self._name):
                 return  # most of the traffic: not worth a closer look
             verdict = self._examine(event)
-            if isinstance(verdict, Heard):
+            if not isinstance(verdict, str):
                 self._tell(verdict, self._now())
             elif verdict:
                 self._refuse(event.key, verdict)
@@ -157,32 +179,27 @@ class PeerShell:
             return ""
         if not address.operator and address.speaker not in self._peers:
             return "stranger"
-        try:
-            envelope = self._decode(publication.payload)
-        except MalformedMessage:
-            return "malformed"
-        if envelope.sender != address.speaker:
-            return "impersonated"
-        if envelope.kind != address.kind or addressee_of(envelope.body) != address.to:
-            return "misplaced"
-        if isinstance(envelope.body, Goal) is not address.operator:
-            return "misplaced"
-        return Heard(address, envelope) if self._is_news(address, envelope) else "stale"
+        message = self._read(publication)
+        if isinstance(message, str) or self._is_news(address, message.envelope):
+            return message
+        return "stale"
 
     def _is_news(self, address: Address, envelope: Envelope) -> bool:
         """Whether this is later than all that the sender has said of this kind; remembers it if so."""
-        memory = self._operators if address.operator else self._heard
-        source, order = (address.speaker, address.kind), (envelope.incarnation, envelope.sequence)
-        if not address.operator:
-            latest = self._incarnations.get(address.speaker, -1)
-            if envelope.incarnation < latest:
+        speaker, incarnation = address.speaker, envelope.incarnation
+        source, order = (speaker, address.kind), (incarnation, envelope.sequence)
+        if address.operator:
+            memory = self._operators
+        else:
+            memory = self._heard
+            if incarnation < self._incarnations.get(speaker, -1):
                 return False
-            self._incarnations[address.speaker] = envelope.incarnation
-        if order <= memory.get(source, (-1, -1)):
+            self._incarnations[speaker] = incarnation
+        if order <= memory.get(source, _NOTHING):
             return False
         memory[source] = order
-        if len(self._operators) > MAXIMUM_OPERATORS:
-            del self._operators[next(iter(self._operators))]
+        if address.operator and len(memory) > MAXIMUM_OPERATORS:
+            del memory[next(iter(memory))]
         return True
 
     def _refuse(self, key: str, reason: Refusal) -> None:
@@ -204,38 +221,37 @@ class PeerShell:
             self._complain("error", (kind, failure), f"failed on {_describe(event)}: {failure}: {problem}"[:400])
 
     def _carry_out(self, effects: Iterable[Effect], now_s: float) -> None:
-        for effect in effects:
-            match effect:
-                case Publish(body):
-                    self._publish(
-                        Envelope(
-                            sender=self._name,
-                            incarnation=self._incarnation,
-                            sequence=self._sequence,
-                            sent_at_s=self._wall_clock(),
-                            body=body,
-                        )
-                    )
-                case Drive(velocity, for_s):
-                    self._driver.drive(velocity, for_s)
-                case Record(record):
-                    self._record(now_s, record)
-                case WakeAt(time_s):
-                    self.wake_at_s = time_s
-                case Compute():
-                    self._execute(effect)
-                case Persist():
-                    self._persist(effect)
+        for effect in effects:  # the most frequent first
+            if isinstance(effect, WakeAt):
+                self.wake_at_s = effect.time_s
+            elif isinstance(effect, Publish):
+                self._publish(effect.body)
+            elif isinstance(effect, Record):
+                self._record(now_s, effect.record)
+            elif isinstance(effect, Drive):
+                self._driver.drive(effect.velocity, effect.for_s)
+            elif isinstance(effect, Compute):
+                self._execute(effect)
+            else:
+                self._persist(effect)
 
-    def _publish(self, envelope: Envelope) -> None:
+    def _publish(self, body: AnyBody) -> None:
+        envelope = Envelope(
+            sender=self._name, incarnation=self._incarnation, sequence=self._sequence,
+            sent_at_s=self._wall_clock(), body=body,
+        )  # fmt: skip
         self._sequence += 1
-        address = Address(self._team, self._name, kind_of(envelope.body), to=addressee_of(envelope.body))
-        self._bus.publish(address.key, encode(envelope))
+        self._bus.publish(_key(self._team, self._name, kind_of(body), addressee_of(body)), encode(envelope))
 
     def _complain(self, level: Literal["warning", "error"], what: tuple[str, str], text: str) -> None:
         if what not in self._complained:
             self._complained.add(what)
             self._record(self._now(), LogLine(level=level, text=f"{text}; further ones like this are only counted"))
+
+
+@lru_cache(maxsize=1024)
+def _key(team: str, speaker: str, kind: str, to: str) -> str:
+    return Address(team, speaker, kind, to=to).key
 
 
 def _describe(event: Event) -> str:

@@ -19,21 +19,29 @@ from launcher.body_rules import BodyRules
 from launcher.fault_timetable import Kill, Timetable
 from launcher.kept_memory import count_kept
 from launcher.order_rules import MotionRules, OrderRules
-from launcher.simulated_peer import SimulatedPeer, decode_shared, holds_lease
+from launcher.simulated_peer import SimulatedPeer, holds_lease, read_shared
 from launcher.simulation import SimulatedTeam
 from launcher.tree_rules import TreeRules
 from launcher.violation import Violation
+from protocol.bus import Received
+from protocol.inbox import Inbox
 from protocol.keys import route
 from protocol.messages import Envelope, Reign
 
-LOOK_S: Final = 1.0
-"""How often it is looked what peers know."""
+LOOK_S: Final = 0.5
+"""How often it is looked what peers know. A set that lost the agent has mostly not grown back to it by then."""
 
 COUNT_S: Final = 10.0
 """How often it is counted what they keep."""
 
-MOST_KEPT: Final[Mapping[type[object], int]] = {Allegiance: 200, SharedEstimate: 20_000, PeerShell: 30_000}
-"""Things in the containers of a mind's part, and of a whole peer; several times what healthy teams keep."""
+MOST_KEPT: Final[Mapping[type[object], int]] = {
+    Allegiance: 200,
+    SharedEstimate: 20_000,
+    PeerShell: 30_000,
+    Inbox: 10_000,
+}
+"""Things in the containers of a mind's part, of a whole peer, and of what waits for one that is paused; several times
+what healthy teams keep."""
 
 JUDGED_KINDS: Final = frozenset({"deployment", "topology", "auction", "confirmation", "state", "vote_request"})
 
@@ -74,13 +82,16 @@ class Invariants:
 
     def _hear(self, peer: SimulatedPeer, key: str, payload: bytes) -> None:
         """Called in the middle of an event, where whatever is raised would count as a failure of the role."""
-        if route(key)[0] in JUDGED_KINDS and self._found is None:
-            envelope = decode_shared(payload)
-            try:
-                for rules in self._rules:
-                    rules.hear(peer, envelope)
-            except Violation as violation:
-                self._found = violation
+        if self._found is not None or route(key)[0] not in JUDGED_KINDS:
+            return
+        message = read_shared(Received(key, payload))
+        try:
+            if isinstance(message, str):
+                raise Violation("what is said can be read", f"what {peer.name} says under {key} is {message}")
+            for rules in self._rules:
+                rules.hear(peer, message.envelope)
+        except Violation as violation:
+            self._found = violation
 
     def _look(self, peer: SimulatedPeer) -> None:
         if self._found is not None:
@@ -101,8 +112,8 @@ class Invariants:
     def _look_at_memory(self) -> None:
         for peer in self._team.peers.values():
             for kind, most in MOST_KEPT.items():
-                part = peer.shell if kind is PeerShell else peer.part(kind)
-                if part is not None and (count := count_kept(part)) > most:
+                kept = {PeerShell: peer.shell, Inbox: peer.inbox}.get(kind) or peer.part(kind)
+                if kept is not None and (count := count_kept(kept)) > most:
                     raise Violation("memory is bounded", f"{kind.__name__} of {peer.name} keeps {count} things")
         self._team.time.call_at(self._team.time.now_s + COUNT_S, self._look_at_memory)
 

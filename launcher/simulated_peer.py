@@ -15,10 +15,9 @@ from typing import TYPE_CHECKING, Final, TypeVar
 from agents.allegiance import Allegiance
 from agents.records import AnyRecord
 from agents.role import Compute, JobDone, Persist, Role, Written
-from agents.shell import PeerShell
+from agents.shell import PeerShell, read
 from protocol.bus import BusEvent
 from protocol.inbox import Inbox
-from protocol.messages import decode
 from protocol.promises import decode_promise
 
 if TYPE_CHECKING:
@@ -30,8 +29,8 @@ if TYPE_CHECKING:
 
 APart = TypeVar("APart")
 
-decode_shared: Final = lru_cache(maxsize=4096)(decode)
-"""Envelopes are values: what one hearer has decoded serves all others, and the rules."""
+read_shared: Final = lru_cache(maxsize=4096)(read)
+"""Messages are values: what one hearer has read serves all others, and the rules."""
 
 WRITING_S: Final = 0.003
 """How long a sound disk takes to keep a promise."""
@@ -146,7 +145,7 @@ class SimulatedPeer:
         self._mover: _TrueBody | None = None
         self._parts: dict[type[object], object] = {}
         self._due_s = math.inf
-        self._waiting: Inbox[JobDone | Written] | None = None
+        self.inbox: Inbox[JobDone | Written] | None = None
         """What arrives while it is paused; None while it is not."""
         self._held: list[tuple[str, bytes]] | None = None
         """What it is about to say; it has been paused in the middle of a sentence, or will be."""
@@ -154,7 +153,7 @@ class SimulatedPeer:
     @property
     def runs(self) -> bool:
         """Whether there is a process, and it is not paused."""
-        return self.shell is not None and self._waiting is None
+        return self.shell is not None and self.inbox is None
 
     @property
     def now_s(self) -> float:
@@ -217,7 +216,7 @@ class SimulatedPeer:
             record=lambda _, record: self._record(self._time.now_s, self.name, record),
             execute=self._execute,
             persist=self._persist,
-            decode=decode_shared,
+            read=read_shared,
         )
         shell.start()
         self._sleep()
@@ -232,7 +231,7 @@ class SimulatedPeer:
         if self.shell is not None:
             self.disk.fail()
             self._bus.close(noticed_after_s)
-            self.shell = self.role = self.allegiance = self._waiting = self._held = None
+            self.shell = self.role = self.allegiance = self.inbox = self._held = None
             self._parts.clear()
             self._due_s = math.inf
         if lose_disk:
@@ -244,16 +243,16 @@ class SimulatedPeer:
         Args:
             speaking: not now, but when it has dealt with its next event, before what it then says has gone out.
         """
-        if self.shell is not None and self._waiting is None:
+        if self.shell is not None and self.inbox is None:
             if speaking:
                 self._held = []
             else:
-                self._waiting = Inbox()
+                self.inbox = Inbox()
 
     def resume(self) -> None:
         """Let the process go on as SIGCONT does: it ends its sentence, looks at what has arrived, then at the clock."""
         held, self._held = self._held, None
-        waiting, self._waiting = self._waiting, None
+        waiting, self.inbox = self.inbox, None
         for key, payload in held or ():
             self._bus.publish(key, payload)
         for event in waiting.wait(0.0) if waiting is not None else ():
@@ -283,19 +282,20 @@ class SimulatedPeer:
         return self.clock.read(self._time.now_s)
 
     def _take(self, event: BusEvent) -> None:
-        if self._waiting is None:
-            self._pass_on(event)
-        else:
-            self._waiting.put(event)
+        if self.inbox is not None:
+            self.inbox.put(event)
+        elif self.shell is not None:
+            self.shell.take(event)
+            self._end_event()
 
     def _come_back(self, incarnation: int, event: JobDone | Written) -> None:
         """Pass on the end of what a process has begun, if that is the one that runs."""
         if self.shell is None or self.incarnation != incarnation:
             return
-        if self._waiting is None:
+        if self.inbox is None:
             self._pass_on(event)
         else:
-            self._waiting.put(event)
+            self.inbox.put(event)
 
     def _pass_on(self, event: BusEvent | JobDone | Written) -> None:
         shell = self.shell
@@ -309,8 +309,8 @@ class SimulatedPeer:
         self._end_event()
 
     def _end_event(self) -> None:
-        if self._held is not None and self._waiting is None:
-            self._waiting = Inbox()
+        if self._held is not None and self.inbox is None:
+            self.inbox = Inbox()
         if self.watch is not None:
             self.watch(self)
         self._sleep()
@@ -331,7 +331,7 @@ class SimulatedPeer:
 
     def _sleep(self) -> None:
         """Have :meth:`_wake` called when the shell is due; calls for times no longer wished for find that out."""
-        if self.shell is not None and self._waiting is None and self.shell.wake_at_s != self._due_s:
+        if self.shell is not None and self.inbox is None and self.shell.wake_at_s != self._due_s:
             self._due_s = self.shell.wake_at_s
             self._time.call_at(self.clock.when(self._due_s), self._wake, self._due_s)
 
