@@ -66,7 +66,10 @@ def merge(run_folder: Path) -> Path:
         )
         if done.returncode != 0 or not partial.is_file():
             problem = (done.stderr.strip().splitlines() or ["no reason given"])[-1]
-            raise RecordingFault(f"{run_folder}: rerun could not merge its recordings: {problem}")
+            raise RecordingFault(
+                f"{run_folder}: rerun could not merge its recordings, which are kept: {problem}; "
+                f"see to that, then say `sightline review {run_folder}`"
+            )
         if not RrdReader(partial).recordings():
             raise RecordingFault(f"{run_folder / RECORDINGS}: none of its {len(pieces)} files can be read")
         partial.replace(merged)

@@ -11,23 +11,22 @@ import contextlib
 import signal
 import socket
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from msgspec import structs
 from rich.console import Console
-from rich.live import Live
 
 from agents.body_places import BODIES, BodyPlaces
 from agents.casting import Casting
 from agents.mission import Mission
 from agents.runtime import import_all
 from agents.shared_estimate import SharedEstimate
-from launcher import status as display
 from launcher.chaos import Chaos, LiveFault, check_live
 from launcher.chaos_control import KEYS, hearing_keys, listening, obey, order_of_key
 from launcher.console import busy, tell
+from launcher.disk_room import RoomWatch, check_room
 from launcher.fault_order import Answer, Order
 from launcher.fault_timetable import FaultyTimetable, Timetable, describe, read_timetable
 from launcher.ground import Ground
@@ -36,8 +35,9 @@ from launcher.observer import Status, TeamView
 from launcher.preparation import Preparation, prepare
 from launcher.processes import age_s
 from launcher.replacement import Replacements
-from launcher.run_folder import RunFolder
+from launcher.run_folder import RUNS, RunFolder
 from launcher.scenario import ScenarioFault
+from launcher.status import shown
 from launcher.supervisor import Supervisor
 from protocol.inbox import Inbox
 from protocol.link_faults import LINKS, LinkTable
@@ -50,8 +50,6 @@ LOOK_S = 0.2
 """How often the launcher looks at what it has heard."""
 LISTENER = 1 << 40
 """Incarnation of an estimate that has no ranges of its own: no process has such a one."""
-LINE_S = 5.0
-"""Where there is no terminal: how often it says how the team is; a chain that breaks or holds again is said at once."""
 
 
 @dataclass
@@ -99,6 +97,8 @@ def run(
         if mission.duration_s is not None and fault.at_s >= mission.duration_s:
             text = f"the run is over at {mission.duration_s:g} s, before {describe(fault)} at {fault.at_s:g} s"
             tell(f"Warning: {text}", console, "yellow")
+    if scarce := check_room(RUNS if RUNS.is_dir() else Path(), len(roster), mission.duration_s):
+        tell(f"Warning: {scarce}", console, "yellow")
     folder = RunFolder.create(name, mission.team)
     folder.write(file, mission, preparation.environment)
     robots = f"{len(mission.robots)} robot" + "s" * (len(mission.robots) != 1)
@@ -215,6 +215,7 @@ async def _accompany(
         return view.leader(mission_time())
 
     chaos = Chaos(mission, supervisor, team.links, leader, mission_time, team.journal.note)
+    room = RoomWatch(course.folder.path, lambda text: tell(f"Warning: {text}", console, "yellow"))
     try:
         supervisor.watch()
         bus = ZenohBus.open(
@@ -223,7 +224,7 @@ async def _accompany(
         chaos.play(faults)
         async with contextlib.AsyncExitStack() as stack:
             await _take_orders(stack, chaos, team, course.folder.path, console)
-            show = stack.enter_context(_shown(mission, console))
+            show = stack.enter_context(shown(mission, console))
             while not stop.is_set():
                 now_s = mission_time()
                 for event in inbox.wait(0.0):
@@ -232,6 +233,7 @@ async def _accompany(
                 status = view.status(now_s)
                 show(status, now_s)
                 _note_obedience(status, mission, course, console)
+                room.look()
                 course.failure = _irreplaceable_loss(supervisor, mission)
                 if course.failure or (mission.duration_s is not None and now_s >= mission.duration_s):
                     break
@@ -287,21 +289,3 @@ def _irreplaceable_loss(supervisor: Supervisor, mission: Mission) -> str:
         return ""
     why = "could not be kept alive" if agent.given_up else "was killed for good"
     return f"the run ended because {agent.name} {why}, and without it nothing is left to do"
-
-
-@contextlib.contextmanager
-def _shown(mission: Mission, console: Console) -> Iterator[Callable[[Status, float], None]]:
-    """A function that shows a status: redrawn in place on a terminal, lines now and then elsewhere."""
-    if console.is_terminal:
-        with Live(console=console, auto_refresh=False, transient=True) as live:
-            yield lambda status, now_s: live.update(display.draw(status, mission, now_s), refresh=True)
-        return
-    said: tuple[float, bool] = (-LINE_S, False)
-
-    def say(status: Status, now_s: float) -> None:
-        nonlocal said
-        if now_s >= said[0] + LINE_S or status.chain_connected != said[1]:
-            said = (now_s, status.chain_connected)
-            tell(display.describe(status, now_s), console)
-
-    yield say

@@ -66,7 +66,7 @@ class RunFolder:
 
     @classmethod
     def create(cls, name: str | None, team: str) -> RunFolder:
-        """Make the folder of a new run in the present folder's ``runs``, and point ``latest`` to it.
+        """Make the folder of a new run in the present folder's ``runs``.
 
         Args:
             name: of the run; the team's name and the time of day if None.
@@ -86,10 +86,6 @@ class RunFolder:
             raise ScenarioFault(f"{path} exists; choose another --name, or remove that run") from problem
         except OSError as problem:
             raise ScenarioFault(f"{path} cannot be made ({problem.strerror}); change to a folder you own") from problem
-        latest = RUNS / LATEST
-        with contextlib.suppress(OSError):  # a convenience, and some file systems have no links
-            latest.unlink(missing_ok=True)
-            latest.symlink_to(path.name)
         return cls(path)
 
     @classmethod
@@ -109,13 +105,27 @@ class RunFolder:
         )
 
     def write(self, scenario_file: Path, mission: Mission, environment: Environment) -> None:
-        """Write what the peers read and what explains the run later."""
-        shutil.copyfile(scenario_file, self.path / "scenario.toml")
-        environment.save(self.path / mission.map_path)
-        self.mission_file.write_bytes(msgspec.json.format(msgspec.json.encode(mission), indent=1))
+        """Write what the peers read and what explains the run later, and point ``latest`` here.
+
+        Raises:
+            ScenarioFault: that is not possible; the folder is removed again.
+        """
         versions = {"sightline": version("sightline"), "python": platform.python_version()}
         versions |= {"platform": platform.platform()} | {library: version(library) for library in _LIBRARIES}
-        (self.path / "versions.json").write_text(json.dumps(versions, indent=1) + "\n", encoding="utf-8")
+        try:
+            (self.path / "scenario.toml").write_bytes(scenario_file.read_bytes())
+            environment.save(self.path / mission.map_path)
+            self.mission_file.write_bytes(msgspec.json.format(msgspec.json.encode(mission), indent=1))
+            (self.path / "versions.json").write_text(json.dumps(versions, indent=1) + "\n", encoding="utf-8")
+        except OSError as problem:
+            shutil.rmtree(self.path, ignore_errors=True)
+            raise ScenarioFault(
+                f"{self.path} cannot be written ({problem.strerror}); make room, or change to another folder"
+            ) from problem
+        latest = RUNS / LATEST
+        with contextlib.suppress(OSError):  # a convenience, and some file systems have no links
+            latest.unlink(missing_ok=True)
+            latest.symlink_to(self.path.name)
 
     def read_mission(self) -> Mission:
         """The run's mission.

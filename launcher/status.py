@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Callable, Iterator
+
+from rich.console import Console
+from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
 from agents.mission import Mission
+from launcher.console import tell
 from launcher.observer import Status
 from launcher.wording import counted
 from protocol.messages import Point
+
+LINE_S = 5.0
+"""Where there is no terminal: how often it says how the team is; a chain that breaks or holds again is said at once."""
 
 _COLOURS = {
     "moving": "cyan",
@@ -20,6 +29,24 @@ _COLOURS = {
     "starting": "dim",
     "waiting": "dim",
 }
+
+
+@contextlib.contextmanager
+def shown(mission: Mission, console: Console) -> Iterator[Callable[[Status, float], None]]:
+    """A function that shows a status: redrawn in place on a terminal, lines now and then elsewhere."""
+    if console.is_terminal:
+        with Live(console=console, auto_refresh=False, transient=True) as live:
+            yield lambda status, now_s: live.update(draw(status, mission, now_s), refresh=True)
+        return
+    said: tuple[float, bool] = (-LINE_S, False)
+
+    def say(status: Status, now_s: float) -> None:
+        nonlocal said
+        if now_s >= said[0] + LINE_S or status.chain_connected != said[1]:
+            said = (now_s, status.chain_connected)
+            tell(describe(status, now_s), console)
+
+    yield say
 
 
 def describe(status: Status, now_s: float) -> str:

@@ -208,6 +208,9 @@ class Supervisor:
         """What the processes of a peer have said."""
         return self._folder / "logs" / f"{peer.name}.log"
 
+    def _remedy(self, peer: Peer) -> str:
+        return f"`sightline fault {self._folder} start {peer.name}`"
+
     def _signal(self, number: signal.Signals) -> None:
         for peer in self.peers.values():
             if peer.pid is not None:  # not yet waited for, so that the id is still its own
@@ -246,14 +249,14 @@ class Supervisor:
         if status == WOULD_JOIN_WRONGLY:
             peer.given_up = True
             said = self.log(peer).read_text(encoding="utf-8", errors="replace").rstrip().rpartition("\n")[2]
-            self._crashed(peer.name, f"{said}; given up")
+            self._crashed(peer.name, f"{said}; given up, until {self._remedy(peer)}")
             return None
         if len(peer.crashes) > RESTARTS:
             peer.given_up = True
             self._crashed(
                 peer.name,
-                f"{peer.name} {how}, the {len(peer.crashes)}th time within {STEADY_S:g} s: given up; "
-                f"see {self.log(peer)}",
+                f"{peer.name} {how}, the {len(peer.crashes)}th time within {STEADY_S:g} s: given up, until "
+                f"{self._remedy(peer)}; see {self.log(peer)}",
             )
             return None
         self._crashed(peer.name, f"{peer.name} {how}; restarting it ({len(peer.crashes)} of {RESTARTS})")

@@ -111,7 +111,8 @@ def test_who_must_not_join_is_given_up_at_once_and_its_sentence_is_passed_on(
         await team.stop()
 
     asyncio.run(play())
-    assert said == ["robot1 does not join: its file is bad; mend it; given up"]
+    again = f"`sightline fault {tmp_path} start robot1`"
+    assert said == [f"robot1 does not join: its file is bad; mend it; given up, until {again}"]
     assert team.peers["robot1"].incarnation == 0
 
 
