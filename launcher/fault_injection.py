@@ -66,15 +66,15 @@ class FaultInjection:
         self._time, self._network, self._peers = time, network, peers
         self._leader, self._note = leader, note
         self._active: list[Fault] = []
-        self._to_come = sum(fault.for_s is not None for fault in timetable.faults)
-        """Faults that have an end, and have not come to it."""
+        self._to_come = len(timetable.faults)
+        """Faults that are not over. Who is dead for good, or has another clock, is not waited for."""
         self._changed_s = 0.0
         for fault in sorted(timetable.faults, key=lambda fault: fault.at_s):
             time.call_at(fault.at_s, self._begin, fault)
 
     @property
     def quiet_since_s(self) -> float:
-        """Since when nothing more goes wrong, but what lasts for ever; infinite: something will, or does."""
+        """Since when nothing more goes wrong, but for who is dead and for clocks; infinite: something will, or does."""
         return math.inf if self._to_come else self._changed_s
 
     def _begin(self, fault: Fault) -> None:
@@ -101,6 +101,8 @@ class FaultInjection:
                 self._set(fault)
         if fault.for_s is not None:
             self._time.call_at(self._time.now_s + fault.for_s, self._end, fault)
+        elif isinstance(fault, Kill | Clock):
+            self._to_come -= 1
 
     def _end(self, fault: Fault) -> None:
         self._active = [other for other in self._active if other is not fault]

@@ -7,7 +7,7 @@ from typing import Final
 
 from agents.mission import Mission
 from agents.standing_orders import StandingOrders
-from launcher.simulated_peer import SimulatedPeer
+from launcher.simulated_peer import SimulatedPeer, holds_lease
 from launcher.simulation import SimulatedTeam
 from launcher.violation import Violation
 from protocol.ballot import CLOCK_DRIFT
@@ -39,11 +39,13 @@ class RecoveryRules:
         self.led_after_s = self.planned_after_s = math.nan
         """How long it took since the last fault; not a number if that has not been seen."""
         self._mission, self._team = mission, team
+        self._begins_s = 1.0 / mission.control_hz
+        """By then all processes have begun."""
         self._led_within_s = LED_S + (REST_AFTER_FAILURE_S / (1.0 - CLOCK_DRIFT) if full_disks else 0.0)
         team.time.call_at(LOOK_S, self._look)
 
     def _look(self) -> None:
-        time, quiet_s = self._team.time, self._team.faults.quiet_since_s
+        time, quiet_s = self._team.time, max(self._team.faults.quiet_since_s, self._begins_s)
         if time.now_s > quiet_s:
             if math.isnan(self.led_after_s):
                 self._look_whether_led(time.now_s - quiet_s)
@@ -58,12 +60,20 @@ class RecoveryRules:
         if 2 * len(voters) <= len(self._mission.voters.voters):
             self.led_after_s = self.planned_after_s = math.inf  # no majority is left
             return
-        lost = [peer.name for peer in voters if peer.allegiance and peer.allegiance.obeyed(peer.now_s) is None]
+        lost = [peer.name for peer in voters if not self._is_led(peer)]
         if not lost:
             self.led_after_s = after_s
         elif after_s > self._led_within_s:
-            text = f"{after_s:.1f} s after the last fault {', '.join(lost)} obey nobody"
+            text = f"{after_s:.1f} s after the last fault {', '.join(lost)} obey nobody who leads"
             raise Violation("a team is led soon after the last fault", text)
+
+    def _is_led(self, peer: SimulatedPeer) -> bool:
+        """Whether a peer obeys somebody who leads: it may obey who has died for some moments more."""
+        reign = None if peer.allegiance is None else peer.allegiance.obeyed(peer.now_s)
+        if reign is None:
+            return False
+        leader = self._team.peers[reign.leader]
+        return leader.allegiance is not None and leader.allegiance.reign == reign and holds_lease(leader)
 
     def _look_whether_planned(self, after_s: float) -> None:
         idle = [peer.name for peer in self._voters() if not self._has_plan(peer)]
