@@ -46,15 +46,21 @@ class Journal:
         self.note(Mishap(kind="kill", who=(peer,), text=f"{peer} is started again", over=True))
 
     def note(self, mishap: Mishap) -> None:
-        """Say and record what befell the team."""
+        """Say and record what befell the team; only say it where nothing can be written: a full disk stops nobody."""
         now_s = time.time() - self._mission.epoch_unix_s
         tell(f"{now_s:6.1f} s  {mishap.text}", self._console)
-        if self._recorder is None:
-            file = self._folder / RECORDINGS / f"{OBSERVER}.0.rrd"
-            self._recorder = RerunRecorder(file, team=self._mission.team, recording_id=self._folder.name, peer=OBSERVER)
-        self._recorder.record(now_s, OBSERVER, mishap)
+        try:
+            if self._recorder is None:
+                self._recorder = self._open()
+            self._recorder.record(now_s, OBSERVER, mishap)
+        except (OSError, RuntimeError) as problem:  # rerun has no exceptions of its own
+            tell(f"Warning: that is not recorded: {problem}", self._console, "yellow")
 
     def close(self) -> None:
         """Finish the file, if there is one."""
         if self._recorder is not None:
             self._recorder.close()
+
+    def _open(self) -> RerunRecorder:
+        file = self._folder / RECORDINGS / f"{OBSERVER}.0.rrd"
+        return RerunRecorder(file, team=self._mission.team, recording_id=self._folder.name, peer=OBSERVER)

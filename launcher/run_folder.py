@@ -95,7 +95,7 @@ class RunFolder:
         Raises:
             ScenarioFault: there is no such run.
         """
-        if run is None and not (RUNS / LATEST).exists():
+        if run in (None, LATEST, str(RUNS / LATEST)) and not (RUNS / LATEST).exists():
             raise ScenarioFault("there is no run in runs/: start one with `sightline run SCENARIO`, or name its folder")
         for path in (Path(run or LATEST), RUNS / (run or LATEST)):
             if (path / "mission.json").is_file():

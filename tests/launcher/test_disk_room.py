@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import shutil
+from io import StringIO
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from rich.console import Console
 
 from agents.mission import Mission
 from launcher.disk_room import RoomWatch, check_room
+from launcher.journal import Journal
 from launcher.run_folder import RunFolder
 from launcher.scenario import ScenarioFault
 from planning.environment import Environment
@@ -78,3 +81,14 @@ def test_a_folder_that_cannot_be_written_is_one_sentence_and_nothing_is_left_of_
     assert str(refused.value).startswith("runs/second cannot be written (No space left on device); make room")
     assert sorted(path.name for path in Path("runs").iterdir()) == ["first", "latest"]
     assert RunFolder.find(None).read_mission() == mission, "the latest is the first"
+
+
+def test_what_befell_the_team_is_said_though_it_cannot_be_recorded(mission: Mission, tmp_path: Path) -> None:
+    paper = StringIO()
+    (tmp_path / "file").touch()
+    journal = Journal(mission, tmp_path / "file", Console(file=paper, width=200))  # rerun fails as on a full disk
+    journal.revived("robot1")
+    journal.close()
+    said = paper.getvalue().splitlines()
+    assert said[0].endswith("s  robot1 is started again")
+    assert said[1].startswith("Warning: that is not recorded: ")
