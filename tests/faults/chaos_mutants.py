@@ -17,6 +17,8 @@ from agents.dispatcher import Dispatcher
 from agents.mission import Ranging
 from agents.movement_authority import MovementAuthority
 from agents.ranging import Transponder
+from agents.reign_duty import ReignDuty
+from agents.retreat import Retreat
 from agents.robot import Robot
 from agents.shared_estimate import SharedEstimate
 from agents.shell import PeerShell
@@ -366,3 +368,124 @@ def sends_all_to_one_lane(patch: Patch) -> None:
         return replace(plan, placements=placements)
 
     patch.setattr(LightPlanner, "_deploy", deploy_in_one_lane)
+
+
+@_mutant
+def gives_orders_after_its_lease(patch: Patch) -> None:
+    """Stays in office when its lease has ended, and gives its last warrant again."""
+    warrant, last = Election.warrant, dict[Any, Any]()
+
+    def warrant_again(self: Any, now_s: float) -> Warrant | None:
+        last[self] = warrant(self, now_s) or last.get(self)
+        return last[self]
+
+    patch.setattr(Election, "warrant", warrant_again)
+    patch.setattr(Election, "_leave_office", lambda _self, _reason: None)
+
+
+@_mutant
+def obeys_after_the_lease(patch: Patch) -> None:
+    """Obeys for two leases more than it was told to."""
+    end_s = Obedience._end_s
+    patch.setattr(Obedience, "_end_s", lambda self, warrant: end_s(self, warrant) + 2.0 * LEASE_S)
+
+
+@_mutant
+def takes_any_word_on_the_tree(patch: Patch) -> None:
+    """Does not ask whether a leader's word on the tree is in force."""
+    take = Allegiance.take
+
+    def take_words(self: Any, kind: str, *arguments: Any) -> str:
+        refusal = take(self, kind, *arguments)
+        return "" if kind == "topology" else refusal
+
+    patch.setattr(Allegiance, "take", take_words)
+
+
+@_mutant
+def takes_words_on_the_tree_as_they_come(patch: Patch) -> None:
+    """Takes them in the order in which they arrive."""
+    take, is_news = Obedience.take, PeerShell._is_news
+
+    def take_in_any_order(
+        self: Any, kind: str, authority: Authority, reign: Reign, warrant: Warrant, now_s: float
+    ) -> Any:
+        if kind == "topology":
+            return self.heed(reign, warrant, now_s)
+        return take(self, kind, authority, reign, warrant, now_s)
+
+    patch.setattr(Obedience, "take", take_in_any_order)
+    patch.setattr(
+        PeerShell, "_is_news",
+        lambda self, address, envelope: is_news(self, address, envelope) or address.kind == "topology",
+    )  # fmt: skip
+
+
+@_mutant
+def counts_trees_anew(patch: Patch) -> None:
+    """Numbers every tree of a reign as its first."""
+    propose = Negotiation._propose
+
+    def propose_first(self: Any, wish: Any, now_s: float) -> None:
+        self._sequence = 0
+        propose(self, wish, now_s)
+
+    patch.setattr(Negotiation, "_propose", propose_first)
+
+
+@_mutant
+def puts_in_force_what_is_new(patch: Patch) -> None:
+    """Forgets the links that a tree has in common with the one before."""
+    commit = Negotiation._commit_if_confirmed
+
+    def commit_new_links(self: Any, now_s: float) -> None:
+        if self._open is not None and not self.unconfirmed():
+            proposal = self._open.proposal
+            tree = structs.replace(proposal.tree, edges=tuple(link.ends for link in proposal.links))
+            self._open.proposal = structs.replace(proposal, tree=tree)
+        commit(self, now_s)
+
+    patch.setattr(Negotiation, "_commit_if_confirmed", commit_new_links)
+
+
+@_mutant
+def takes_an_earlier_tree(patch: Patch) -> None:
+    """Keeps the links that were named last, whatever their number."""
+    take = HeldTree.take
+
+    def take_last(self: Any, word: Topology) -> str:
+        if word.committed is not None:
+            self.committed = word.committed
+        return take(self, word)
+
+    patch.setattr(HeldTree, "take", take_last)
+
+
+@_mutant
+def goes_while_another_tree_is_negotiated(patch: Patch) -> None:
+    """Never takes back the leave to release more, once it has been given."""
+    permit = Dispatcher.permit
+
+    def permit_for_good(self: Any, permitted: bool) -> None:
+        self.given = permitted or getattr(self, "given", False)
+        permit(self, self.given)
+
+    patch.setattr(Dispatcher, "permit", permit_for_good)
+
+
+@_mutant
+def waits_for_everybody(patch: Patch) -> None:
+    """Plans only when all robots of the roster are there."""
+    patch.setattr(ReignDuty, "_is_complete", lambda self, _now_s: not self._roll.missing)
+
+
+@_mutant
+def goes_back_on_its_own(patch: Patch) -> None:
+    """Does not wait until all others have turned."""
+    patch.setattr(Retreat, "missing", lambda _self, _now_s: ())
+
+
+@_mutant
+def goes_back_as_fast_as_it_can(patch: Patch) -> None:
+    """Does not wait for those who are farther out."""
+    patch.setattr(Retreat, "_may_enter", lambda self, _stage, now_s: bool(self.others) and not self.missing(now_s))

@@ -4,14 +4,23 @@ from __future__ import annotations
 
 from typing import Final
 
-from launcher.fault_timetable import Clock, Cut, Delay, Disk, Fault, Kill, Loss, Partition
+from launcher.fault_timetable import Clock, Cut, Delay, Disk, Fault, Kill, Loss, Partition, Pause
 from tests.faults.chaos_mission import ChaosCase
 
 
 def _case(
-    ends_s: float, *faults: Fault, robots: int = 2, seed: int = 1, duration_s: float = 30.0, announces: bool = True
+    ends_s: float,
+    *faults: Fault,
+    robots: int = 2,
+    seed: int = 1,
+    duration_s: float = 30.0,
+    announces: bool = True,
+    retreat_after_s: float = 10.0,
 ) -> ChaosCase:
-    return ChaosCase(seed=seed, robots=robots, duration_s=duration_s, ends_s=ends_s, announces=announces, faults=faults)
+    return ChaosCase(
+        seed=seed, robots=robots, duration_s=duration_s, ends_s=ends_s, announces=announces,
+        retreat_after_s=retreat_after_s, faults=faults,
+    )  # fmt: skip
 
 
 VOTERS = ("base", "robot1", "robot2")
@@ -26,6 +35,12 @@ OLD_VOTES: Final = (
     Cut(at_s=5.0, speakers=("base",)),
 )
 """Votes take long to the base station, which is then not heard any more: so the votes that come are old."""
+
+DEAF: Final = Cut(at_s=3.0, for_s=9.0, hearers=("robot1",))
+"""It hears nothing more, and is heard."""
+
+LATE: Final = Delay(at_s=2.0, speakers=("base",), hearers=("robot1",), least_s=1.5, mean_s=0.0)
+"""All that the leader says is old when it arrives at one of its robots."""
 
 CASES: Final[dict[str, tuple[str, ChaosCase]]] = {
     "skips_the_write": ("epochs rise", _case(8.0, *BLACKOUT)),
@@ -49,12 +64,11 @@ CASES: Final[dict[str, tuple[str, ChaosCase]]] = {
     ),
     "ignores_the_epoch": (
         "epochs rise",
-        _case(
-            4.0,
-            Kill(at_s=0.492, for_s=1.239, who="base", noticed_after_s=1.0),
-            Kill(at_s=0.994, for_s=0.174, who="leader"),
-            seed=55,
-            duration_s=17.0,
+        _case(  # robot1 has not heard of any epoch, and robot2, which has, hangs until its promise has ended
+            8.0,
+            Partition(at_s=0.0, for_s=4.5, group=("robot1",)),
+            Kill(at_s=4.0, who="base"),
+            Pause(at_s=4.0, for_s=1.5, who="robot2"),
         ),
     ),
     "ignores_its_promise": (
@@ -81,15 +95,22 @@ CASES: Final[dict[str, tuple[str, ChaosCase]]] = {
         "one leads",
         _case(8.0, Partition(at_s=3.0, group=("base",))),
     ),
-    "obeys_without_a_warrant": (
-        "no order is taken when its lease has ended",
-        _case(8.0, Delay(at_s=2.0, speakers=("base",), hearers=("robot1",), least_s=1.5, mean_s=0.0)),
+    "gives_orders_after_its_lease": (
+        "orders are given within a lease",
+        _case(8.0, Partition(at_s=3.0, group=("base",))),
     ),
-    "judges_validity_on_arrival": (
-        "no order is taken when its lease has ended",
-        _case(8.0, Delay(at_s=2.0, speakers=("base",), hearers=("robot1",), least_s=1.5, mean_s=0.0)),
+    "obeys_after_the_lease": (
+        "who obeys obeys who leads",
+        _case(8.0, DEAF, Kill(at_s=3.0, who="base"), robots=4),
     ),
+    "obeys_without_a_warrant": ("no order is taken when its lease has ended", _case(8.0, LATE)),
+    "judges_validity_on_arrival": ("no order is taken when its lease has ended", _case(8.0, LATE)),
+    "takes_any_word_on_the_tree": ("no order is taken when its lease has ended", _case(8.0, LATE)),
     "ignores_the_sequence": (
+        "no older order after a newer one",
+        _case(8.0, Delay(at_s=1.0, mean_s=0.1, overtaking=True)),
+    ),
+    "takes_words_on_the_tree_as_they_come": (
         "no older order after a newer one",
         _case(8.0, Delay(at_s=1.0, mean_s=0.1, overtaking=True)),
     ),
@@ -103,13 +124,38 @@ CASES: Final[dict[str, tuple[str, ChaosCase]]] = {
         "nothing is released before all have accepted it",
         _case(14.0, Loss(at_s=2.0, speakers=("base",), hearers=("robot1",), share=0.7), robots=3),
     ),
+    "goes_back_on_its_own": (
+        "nobody goes back before all have turned",
+        _case(16.0, *(Kill(at_s=7.5, who=name) for name in ("base", "robot2")), retreat_after_s=5.0),
+    ),
+    "goes_back_as_fast_as_it_can": (
+        "nobody goes back ahead of those who are farther",
+        _case(
+            30.0,
+            *(Kill(at_s=2.0, who=name) for name in ("robot3", "robot4")),
+            Kill(at_s=20.0, who="base"),
+            robots=4,
+            duration_s=40.0,
+            retreat_after_s=5.0,
+        ),
+    ),
     "releases_links_first": ("links are released when their replacement is confirmed", _case(4.0)),
     "trusts_its_predecessor": (
         "links are released when their replacement is confirmed",
         _case(20.0, *(Kill(at_s=at_s, for_s=2.0, who="leader") for at_s in (6.0, 11.0)), robots=4),
     ),
     "takes_a_proposal_for_the_tree": ("links kept are of a tree in force", _case(4.0)),
+    "counts_trees_anew": ("trees are numbered", _case(16.0, robots=3)),
+    "puts_in_force_what_is_new": ("trees span their members", _case(20.0, robots=3)),
+    "takes_an_earlier_tree": (
+        "nobody goes back to an earlier tree",
+        _case(16.0, Pause(at_s=4.0, for_s=3.0, who="base"), Kill(at_s=9.0, who="leader"), robots=4),
+    ),
     "goes_before_the_tree_is_in_force": ("nobody goes where another tree is needed", _case(4.0, seed=0)),
+    "goes_while_another_tree_is_negotiated": (
+        "nobody goes where another tree is needed",
+        _case(16.0, Delay(at_s=5.0, hearers=("base",), least_s=0.05, mean_s=0.0), robots=3, seed=2),
+    ),
     "keeps_proposals_open": (
         "proposals are bounded",
         _case(10.0, Cut(at_s=5.2, speakers=("robot1",), hearers=("base",)), robots=3),
@@ -117,6 +163,10 @@ CASES: Final[dict[str, tuple[str, ChaosCase]]] = {
     "never_stands": (
         "a team is led soon after the last fault",
         _case(12.0, Kill(at_s=3.0, for_s=0.5, who="leader")),
+    ),
+    "waits_for_everybody": (
+        "a team that is led has a plan soon",
+        _case(11.0, Kill(at_s=3.0, who="robot3"), Kill(at_s=6.0, who="leader"), robots=4),
     ),
     "remembers_everything": ("memory is bounded", _case(26.0, robots=1)),
     "forgets_the_round_trip": (
@@ -153,3 +203,11 @@ CASES: Final[dict[str, tuple[str, ChaosCase]]] = {
     "fails_on_a_vanished_peer": ("roles fail on nothing", _case(4.0, Kill(at_s=3.0, who="agent"))),
 }
 """By mutant: the rule that it breaks, and where."""
+
+FURTHER: Final[dict[str, tuple[str, ChaosCase]]] = {
+    "obeys_after_the_lease": (  # robot2 hangs, so that the base station leads again, in another process
+        "all obey the same",
+        _case(8.0, DEAF, Kill(at_s=3.0, for_s=0.1, who="base"), Pause(at_s=3.0, for_s=1.2, who="robot2")),
+    ),
+}
+"""Mutants that break another rule elsewhere."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from typing import Final
 
 from msgspec import structs
 
@@ -10,7 +11,10 @@ from launcher.fault_timetable import Fault
 from tests.faults.chaos import Verdict
 from tests.faults.chaos_mission import ChaosCase, robot_names
 
-MOST_RUNS = 400
+MOST_RUNS: Final = 400
+
+LATER_S: Final = 1.0
+"""In a smaller case the rule may be broken so much later."""
 
 
 def shrink(case: ChaosCase, run: Callable[[ChaosCase], Verdict], most_runs: int = MOST_RUNS) -> ChaosCase:
@@ -34,6 +38,8 @@ def shrink(case: ChaosCase, run: Callable[[ChaosCase], Verdict], most_runs: int 
     def breaks(smaller: ChaosCase) -> ChaosCase | None:
         nonlocal runs
         runs += 1
+        ends_s = smaller.duration_s if smaller.ends_s is None else min(smaller.ends_s + LATER_S, smaller.duration_s)
+        smaller = structs.replace(smaller, ends_s=ends_s)
         verdict = run(smaller)
         return _ending(smaller, verdict) if verdict.broken is not None and verdict.broken.rule == rule else None
 

@@ -8,11 +8,12 @@ from __future__ import annotations
 import pytest
 
 from agents.records import Office
-from launcher.fault_timetable import Kill, Loss, Partition
+from launcher.fault_timetable import Clock, Kill, Loss, Partition
+from launcher.reigns import find_reigns
 from tests.faults.chaos import run_chaos
 from tests.faults.chaos_mission import LONGEST_FAULT_S, ChaosCase, draw_case, read_case, write_case
 from tests.faults.chaos_mutants import MUTANTS
-from tests.faults.mutant_cases import CASES
+from tests.faults.mutant_cases import CASES, FURTHER
 from tests.faults.shrinking import shrink
 
 SEEDS = range(1000, 1010)
@@ -26,6 +27,8 @@ def test_no_rule_is_broken(seed: int) -> None:
     case = draw_case(seed, (2, 3), (12, 18))
     verdict = run_chaos(case)
     assert verdict.broken is None, f"{write_case(case)}\n{verdict.trace()}"
+    if not any(isinstance(fault, Clock) or (isinstance(fault, Kill) and fault.disk == "lost") for fault in case.faults):
+        assert find_reigns(verdict.history, 0.0).broken == (), "what was recorded breaks no rule, either"
 
 
 def test_the_missions_are_hard() -> None:
@@ -48,15 +51,21 @@ def test_in_some_missions_robots_go_back() -> None:
     assert verdict.went_back > 0
 
 
-@pytest.mark.parametrize("name", MUTANTS)
-def test_a_rule_left_out_is_found_out(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    rule, case = CASES[name]
+@pytest.mark.parametrize(
+    ("name", "rule", "case"),
+    [pytest.param(name, *found, id=name) for name, found in (*CASES.items(), *FURTHER.items())],
+)
+def test_a_rule_left_out_is_found_out(name: str, rule: str, case: ChaosCase, monkeypatch: pytest.MonkeyPatch) -> None:
     healthy = run_chaos(case)
     assert healthy.broken is None, healthy.trace()
     MUTANTS[name](monkeypatch)
     broken = run_chaos(case).broken
     assert broken is not None, f"{name} is not found out"
     assert broken.rule == rule
+
+
+def test_there_is_a_mission_for_each_rule_left_out() -> None:
+    assert CASES.keys() == MUTANTS.keys() >= FURTHER.keys()
 
 
 def test_the_same_case_has_the_same_history_to_the_last_bit() -> None:
