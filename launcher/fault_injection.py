@@ -77,6 +77,10 @@ class FaultInjection:
         """Since when nothing more goes wrong, but for who is dead and for clocks; infinite: something will, or does."""
         return math.inf if self._to_come else self._changed_s
 
+    def keep_away(self, who: str) -> bool:
+        """Whether a peer has been killed and is not to be back yet."""
+        return bool(self._on(Kill, who))
+
     def _begin(self, fault: Fault) -> None:
         if isinstance(fault, PeerFault) and fault.who == LEADER:
             name = self._leader()

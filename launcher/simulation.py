@@ -69,7 +69,11 @@ class SimulatedTeam:
         chance = np.random.default_rng([mission.seed, len(self.peers)])
         phases_s = chance.uniform(0.0, 1.0 / mission.control_hz, len(self.peers))
         for peer, phase_s in zip(self.peers.values(), phases_s, strict=True):
-            time.call_at(float(phase_s), peer.start)
+            time.call_at(float(phase_s), self._begin, peer)
+
+    def _begin(self, peer: SimulatedPeer) -> None:
+        if not self.faults.keep_away(peer.name):  # who is killed before that comes late, or never
+            peer.start()
 
     def leader(self) -> str | None:
         """Who holds an unexpired lease now."""

@@ -16,6 +16,7 @@ from msgspec import structs
 import maps
 from agents.mission import Behaviour, Mission, RosterEntry, Scripted, Wandering
 from agents.records import AnyRecord, Connectivity
+from launcher.fault_timetable import Kill, Timetable
 from launcher.mission_trace import MissionTrace
 from launcher.report import measure
 from launcher.simulation import simulate
@@ -180,3 +181,23 @@ def test_lasts_as_long_as_it_is_told() -> None:
     trace = simulate(mission, CORNER, duration_s=2.0)
     assert trace.duration_s == 2.0
     assert max(float(trail.times_s[-1]) for trail in trace.trails) <= 2.0
+
+
+@pytest.mark.parametrize("late_s", [8.0, None])
+def test_a_robot_that_is_away_from_the_start_joins_when_it_comes_and_never_where_it_does_not(
+    late_s: float | None,
+) -> None:
+    away = Timetable(faults=(Kill(at_s=0.0, for_s=late_s, who="robot2"),))
+    trace = simulate(around_the_corner(), CORNER, duration_s=12.0, faults=away)
+    trail = next(trail for trail in trace.trails if trail.peer == "robot2")
+    scheduled = [
+        (at_s, {way.member for way in ordered.motion.ways if way.scheduled}) for at_s, ordered in trace.motions
+    ]
+    planned = [at_s for at_s, members in scheduled if "robot2" in members]
+    assert "robot1" in scheduled[0][1]
+    if late_s is None:
+        assert len(trail.times_s) == 0
+        assert planned == []
+    else:
+        assert late_s <= trail.times_s[0] <= late_s + 0.2
+        assert late_s <= planned[0] <= late_s + 2.0, "the leader counts on it"
