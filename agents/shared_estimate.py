@@ -92,6 +92,8 @@ class SharedEstimate:
         self._debts = Debts(others, f"{mission.seed}/{name}/{incarnation}/turns")
         share = voters.index(name) / len(voters)
         self._digest = Rhythm(DIGEST_S, DIGEST_S * (share - 1.0))
+        self._joining, self._asks_s = True, math.inf
+        """Whether it has yet to hear what others have; from when on it says a digest out of turn."""
         self._recording = Rhythm(RECORD_S, 0.0)
         self._own: deque[TimedRange] = deque(maxlen=REPEATED)
         self._newest_s = -math.inf
@@ -101,13 +103,14 @@ class SharedEstimate:
     @property
     def next_s(self) -> float:
         """When a digest, an answer or a record is due."""
-        return min(self._digest.next_s, self._debts.next_s, self._recording.next_s)
+        return min(self._digest.next_s, self._asks_s, self._debts.next_s, self._recording.next_s)
 
     def handle(self, event: Event, now_s: float) -> Iterator[Effect]:
         """Take in what others say; answer and say what is due."""
         match event:
             case Woken():
-                if self._digest.due(now_s):
+                if self._digest.due(now_s) or now_s >= self._asks_s:
+                    self._asks_s = math.inf
                     yield from self._sum_up(now_s)
                 yield from self._answer(now_s)
                 if self._recording.due(now_s) and (target := self.target(now_s)) is not None:
@@ -197,6 +200,9 @@ class SharedEstimate:
             self._refused += 1
             return
         self._ranges.note(digest)
+        if self._joining and digest.heard:
+            # Its own first digest may have been said before it was linked with anybody who has what it lacks.
+            self._joining, self._asks_s = False, now_s
         lacks: list[tuple[str, int]] = [BASE] if self._ranges.needs_base(digest) else []
         lacks += [
             (record.peer, record.number)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import threading
 from collections import deque
 from contextlib import suppress
+from functools import lru_cache
 from typing import Generic, TypeVar
 
 from protocol.bus import BusEvent, Received
@@ -53,8 +54,9 @@ class Inbox(Generic[Local]):
 
     def wake(self) -> None:
         """Let the present or else the next :meth:`wait` return at once. Any thread, and signal handlers too."""
-        with suppress(RuntimeError):  # it has been rung already
-            self._bell.release()
+        if self._bell.locked():
+            with suppress(RuntimeError):  # somebody else has just rung it
+                self._bell.release()
 
     def wait(self, timeout_s: float) -> list[BusEvent | Local]:
         """All events, in order of arrival, as soon as there is one, it was woken, or the time is over.
@@ -76,9 +78,14 @@ class Inbox(Generic[Local]):
                 self.dropped += 1
                 return False
             tickets = self._tickets[key] = deque()
-        periodic = route(key)[0] in PERIODIC_KINDS
+        periodic = _is_periodic(key)
         if len(tickets) >= (1 if periodic else PER_KEY):
             del self._waiting[tickets.popleft()]
             self.dropped += not periodic
         tickets.append(self._arrived)
         return True
+
+
+@lru_cache(maxsize=1024)  # the same few keys come again and again
+def _is_periodic(key: str) -> bool:
+    return route(key)[0] in PERIODIC_KINDS

@@ -22,6 +22,7 @@ import time
 import traceback
 from collections import deque
 from collections.abc import Callable, Collection, Sequence
+from contextlib import suppress
 from typing import Any, Final, TypeAlias
 
 import zenoh
@@ -36,7 +37,7 @@ __all__ = ["BusUnavailable", "ZenohBus", "free_endpoints"]
 CLOSE_WITHIN_S: Final = 1.0
 """zenoh waits up to 10 s for a listener that is stuck; the token is gone by then, and the process may end."""
 
-READ_EVERY_S: Final = 0.005
+READ_EVERY_S: Final = 0.01
 """Between two looks at what has arrived."""
 
 MOST_WAITING: Final = 1024
@@ -143,7 +144,10 @@ class ZenohBus:
             self._listen(session.declare_subscriber(expression, _ring(), allowed_origin=remote), self._hear)
         if peer:
             own = keys.Address(self.team, self.name, "*").key
-            self._listen(session.declare_queryable(own, _ring(), allowed_origin=remote), self._answer)
+            queries = session.declare_queryable(own, _ring(), allowed_origin=remote)
+            self._declared.append(queries)
+            # Beside the reading: an answer goes as its query came, which may be to wait for an asker that is stuck.
+            threading.Thread(target=self._answer_all, args=(queries,), name="zenoh bus answers", daemon=True).start()
         liveliness = session.liveliness()
         self._listen(liveliness.declare_subscriber(keys.tokens(self.team), _ring(), history=True), self._notice)
         if peer:
@@ -217,18 +221,18 @@ class ZenohBus:
             allowed_destination=zenoh.Locality.REMOTE,
         )
 
+    def _answer_all(self, queries: Any) -> None:
+        with suppress(zenoh.ZError):  # it is not declared any more
+            for query in queries:
+                self._answer(query)
+
     def _answer(self, query: Any) -> None:
         """Say the standing words that a query asks for to whoever asks."""
         now_s = time.monotonic()
         with query:
             for key, (said_s, payload) in tuple(self._said.items()):
                 if now_s - said_s < STANDS_FOR_S and query.key_expr.intersects(zenoh.KeyExpr(key)):
-                    query.reply(
-                        key,
-                        payload,
-                        encoding=zenoh.Encoding.APPLICATION_JSON,
-                        congestion_control=zenoh.CongestionControl.DROP,
-                    )
+                    query.reply(key, payload, encoding=zenoh.Encoding.APPLICATION_JSON)
 
     def _next_answer(self) -> Any:
         return self._answers.popleft() if self._answers else None

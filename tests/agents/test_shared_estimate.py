@@ -269,3 +269,20 @@ def test_a_new_range_is_said_at_once_with_those_before_it() -> None:
         numbers = [one.number for one in effect.body.ranges]
         assert numbers == list(range(max(0, number + 1 - REPEATED), number + 1))
         assert decode(encode(heard(effect.body, "base").envelope)).body == effect.body
+
+
+def test_who_joins_late_says_what_it_has_as_soon_as_it_hears_what_others_have() -> None:
+    """Its first digest was said when it was linked with nobody; the next of its rhythm is up to a second away."""
+    late = fresh("robot2")
+    now_s = 100.0
+    list(late.handle(Woken((1.0, 1.0)), now_s))
+    others = RangeDigest(clock_s=now_s, heard=(HeardRanges(owner="base", start=0, below=300),))
+    nothing = RangeDigest(clock_s=now_s, heard=())
+    list(late.handle(heard(nothing, "robot3"), now_s))
+    assert late.next_s > now_s, "who has nothing has nothing to send"
+    for sender, expected in (("base", 1), ("robot1", 0)):
+        list(late.handle(heard(others, sender), now_s))
+        effects = list(late.handle(Woken((1.0, 1.0)), now_s))
+        digests = [e.body for e in effects if isinstance(e, Publish) and isinstance(e.body, RangeDigest)]
+        assert [digest.heard for digest in digests] == [()] * expected
+        assert late.next_s > now_s

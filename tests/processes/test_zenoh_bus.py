@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -63,10 +63,12 @@ def stack() -> Iterator[ExitStack]:
         yield stack
 
 
-def join(stack: ExitStack, name: str, endpoints: list[str], index: int | None) -> tuple[ZenohBus, Ear]:
+def join(
+    stack: ExitStack, name: str, endpoints: list[str], index: int | None, kinds: Collection[str] | None = None
+) -> tuple[ZenohBus, Ear]:
     ear = Ear()
     listen = None if index is None else endpoints[index]
-    bus = ZenohBus.open(TEAM, name, listen, endpoints, ear, operator=index is None)
+    bus = ZenohBus.open(TEAM, name, listen, endpoints, ear, operator=index is None, kinds=kinds)
     stack.callback(bus.close)
     return bus, ear
 
@@ -134,6 +136,54 @@ def test_operators_hear_all_and_have_no_token(stack: ExitStack) -> None:
     operator.close()
     bus.publish(f"{TEAM}/v1/r0/state", b"{}")
     assert ear.heard == [Received(f"{TEAM}/v1/operator/ada/goal", b"{}")], "an operator neither comes nor goes"
+
+
+def test_peers_hear_the_kinds_that_they_listen_to_and_what_is_for_them(stack: ExitStack) -> None:
+    endpoints = free_endpoints(3)
+    speaker, _ = join(stack, "r0", endpoints, 0)
+    _, ear = join(stack, "r1", endpoints, 1, {"state", "vote", "goal"})
+    operator, operator_ear = join(stack, "ada", endpoints, None)
+    ears = []
+    for _ in range(2):  # r2 ends, and joins again
+        bus, late_ear = join(stack, "r2", endpoints, 2, {"vote"})
+        ears.append(late_ear)
+        for other in (ear, late_ear, operator_ear):
+            other.wait_for(PeerAppeared("r0"))
+        late_ear.wait_for(PeerAppeared("r1"))
+        ear.wait_for(PeerAppeared("r2"))
+        operator.publish(f"{TEAM}/v1/operator/ada/goal", b"goal")
+        for key in ("heartbeat", "state", "vote/r1", "vote/r2", "vote", "goal", "deployment"):
+            speaker.publish(f"{TEAM}/v1/r0/{key}", b"{}")
+        late_ear.wait_for(Received(f"{TEAM}/v1/r0/vote/r2", b"{}"))
+        operator_ear.wait_until(lambda: len({e.key for e in operator_ear.heard if isinstance(e, Received)}) == 7, "all")
+        bus.close()
+        ear.wait_for(PeerVanished("r2"))
+        ear.heard.remove(PeerVanished("r2"))
+        ear.heard.remove(PeerAppeared("r2"))
+    expected = {f"{TEAM}/v1/r0/state", f"{TEAM}/v1/r0/vote/r1", f"{TEAM}/v1/operator/ada/goal"}
+    ear.wait_until(lambda: {e.key for e in ear.heard if isinstance(e, Received)} == expected, f"{expected} alone")
+    for late_ear in ears:
+        assert {e.key for e in late_ear.heard if isinstance(e, Received)} == {f"{TEAM}/v1/r0/vote/r2"}
+
+
+def test_who_joins_late_is_told_what_stands_without_waiting_for_it_to_be_said_again(stack: ExitStack) -> None:
+    """Nothing is said twice here, so that without an answer nothing would be heard."""
+    endpoints = free_endpoints(2)
+    bus, _ = join(stack, "r0", endpoints, 0)
+    said: list[dict[str, bytes]] = []
+
+    def say() -> None:
+        words = {kind: f"{kind} {len(said)}".encode() for kind in ("deployment", "topology", "range_digest", "auction")}
+        said.append(words)
+        for kind, word in words.items():
+            bus.publish(f"{TEAM}/v1/r0/{kind}", word)
+
+    say()
+    say()
+    _, ear = join(stack, "r1", endpoints, 1, {"deployment", "topology", "auction"})
+    ear.wait_for(*(Received(f"{TEAM}/v1/r0/{kind}", said[1][kind]) for kind in ("deployment", "topology")))
+    heard = [event for event in ear.heard if isinstance(event, Received)]
+    assert len(heard) == 2, "only what it listens to, only the latest, and only what stands"
 
 
 def test_a_late_joiner_sees_who_is_there_and_is_seen_to_leave(stack: ExitStack) -> None:
@@ -224,7 +274,7 @@ def test_payloads_that_are_too_long_are_not_delivered(stack: ExitStack) -> None:
     bus, _ = join(stack, "r0", endpoints, 0)
     listener, ear = join(stack, "r1", endpoints, 1)
     ear.wait_for(PeerAppeared("r0"))
-    key = f"{TEAM}/v1/r0/state"
+    key = f"{TEAM}/v1/r0/ranges"
     for length in (MAXIMUM_PAYLOAD_BYTES + 1, 4 * MAXIMUM_PAYLOAD_BYTES):
         bus.publish(key, bytes(length))
     deadline = time.monotonic() + PATIENCE_S
