@@ -26,6 +26,7 @@ from typing import Annotated, Any, Final, Literal, TypeAlias
 import msgspec
 from msgspec import Meta
 
+from launcher.wording import misfit
 from protocol.messages import Name
 
 LEADER: Final = "leader"
@@ -309,4 +310,10 @@ def _explain(message: str, raw: dict[str, Any]) -> str:
         return f"{place}.{missing[1]} is missing; add it{choices}"
     if value := re.fullmatch(r"Invalid value '(.*)'", what):
         return f"{place} is '{value[1]}'; choose one of {', '.join(kinds)}"
+    if wrong := misfit(what):
+        return f"{place} {wrong}"
+    if what.startswith("Expected `array` of length >="):
+        return f"{place} is empty; name at least one peer"
+    if what.startswith("Expected `str` matching regex"):
+        return f"{place} cannot be a peer's name; use one on the roster, such as base, agent, robot1"
     return f"{place} does not fit: {what[:1].lower()}{what[1:]}; docs/faults.md shows every kind"

@@ -21,7 +21,7 @@ from msgspec import Meta
 
 import maps
 from launcher.fault_timetable import Fault, FaultyTimetable, timetable_of
-from launcher.wording import counted
+from launcher.wording import counted, misfit
 from protocol.keys import is_name
 from protocol.messages import Point
 
@@ -155,10 +155,6 @@ _EXAMPLES = {
     "agent.start": "start = [3.0, 3.0]",
     "robots": "[robots] with count = 4",
 }
-_WORDS = {
-    "float": "a number", "int": "a whole number", "str": 'text in quotes', "array": "a list", "object": "a table",
-    "bool": "true or false", "null": "nothing",
-}  # fmt: skip
 
 
 def packaged() -> list[str]:
@@ -318,10 +314,8 @@ def _explain(message: str) -> str:
     if missing := re.fullmatch(r"Object missing required field `(.*)`", what):
         key = f"{place}.{missing[1]}" if place else missing[1]
         return f"{key} is missing; add {_EXAMPLES[key]}"
-    if kinds := re.fullmatch(r"Expected `(.*)`, got `(.*)`", what):
-        wanted = " or ".join(_WORDS.get(kind, kind) for kind in kinds[1].split(" | ") if kind != "null")
-        got = _WORDS.get(kinds[2], f"a {kinds[2]}")
-        return f"{place} is {got}; it must be {wanted}{_like(place)}"
+    if wrong := misfit(what):
+        return f"{place} {wrong}{'' if 'out of range' in wrong else _like(place)}"
     if length := re.fullmatch(r"Expected `array` of length 2, got (\d+)", what):
         return f"{place} has {counted(int(length[1]), 'number')}; a place is [x, y] in metres"
     if enum := re.fullmatch(r"Invalid enum value '(.*)'", what):
@@ -329,11 +323,6 @@ def _explain(message: str) -> str:
         near = difflib.get_close_matches(enum[1], choices, n=1)
         hint = f"did you mean '{near[0]}'" if near else f"choose one of {', '.join(choices)}"
         return f"{place} is '{enum[1]}'; {hint}"
-    if bound := re.fullmatch(r"Expected `(.*)` (>=|>|<=|<) (\S+)", what):
-        words = {">=": "at least", ">": "more than", "<=": "at most", "<": "less than"}
-        return f"{place} is out of range; it must be {words[bound[2]]} {bound[3].removesuffix('.0')}"
-    if what == "Number out of range":
-        return f"{place} is out of range; it must have fewer digits"
     return f"{place or 'the file'} does not fit: {what[:1].lower()}{what[1:]}"
 
 

@@ -65,18 +65,33 @@ def test_it_says_when_nothing_is_amiss_any_more() -> None:
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("faults = 3", "faults does not fit: expected `array`"),
+        ("faults = 3", "faults is a whole number; it must be a list"),
         ("x = 1", "unknown key 'x' in the file; the keys there are faults"),
         ("[[faults]]\nat_s = 1", r"faults\[0\].kind is missing; add it, one of kill, pause"),
         ('[[faults]]\nkind = "x"', r"faults\[0\].kind is 'x'; choose one of kill, pause"),
         ('[[faults]]\nkind = "kill"\nat_s = 1', r"faults\[0\].who is missing; add it"),
-        ('[[faults]]\nkind = "kill"\nat_s = -1\nwho = "base"', r"faults\[0\].at_s does not fit: .* >= 0"),
-        ('[[faults]]\nkind = "loss"\nat_s = 1\nshare = 2.0', r"faults\[0\].share does not fit: .* <= 1"),
+        (
+            '[[faults]]\nkind = "kill"\nat_s = -1\nwho = "base"',
+            r"faults\[0\].at_s is out of range; it must be at least 0",
+        ),
+        (
+            '[[faults]]\nkind = "loss"\nat_s = 1\nshare = 2.0',
+            r"faults\[0\].share is out of range; it must be at most 1",
+        ),
         ('[[faults]]\nkind = "kill"\nat_s = 1\nwho = "base"\nx = 2', r"unknown key 'x' in faults\[0\]; .* who"),
         ('[[faults]]\nkind = "kill"\nat_s = 1\nwho = "bob"', r"names 'bob', who is not there; choose one of base"),
         ('[[faults]]\nkind = "cut"\nat_s = 1\nhearers = ["leader"]', r"faults\[0\].hearers names 'leader'"),
         ('[[faults]]\nkind = "pause"\nat_s = 1\nwho = "base"', "pauses base for ever; add for_s = 2.0, or kill it"),
-        ('[[faults]]\nkind = "kill"\nat_s = nan\nwho = "base"', r"faults\[0\].at_s does not fit"),
+        ('[[faults]]\nkind = "kill"\nat_s = "soon"\nwho = "base"', r"at_s is text in quotes; it must be a number"),
+        (
+            '[[faults]]\nkind = "kill"\nat_s = 1\nwho = "Base"',
+            r"faults\[0\].who cannot be a peer's name; use one on the",
+        ),
+        ('[[faults]]\nkind = "partition"\nat_s = 1\ngroup = []', r"faults\[0\].group is empty; name at least one peer"),
+        (
+            '[[faults]]\nkind = "kill"\nat_s = nan\nwho = "base"',
+            r"faults\[0\].at_s is out of range; it must be at least 0",
+        ),
         ("faults = [", "is not valid TOML"),
     ],
 )
