@@ -24,7 +24,7 @@ def text_of(point: Point) -> str:
 
 
 def misfit(said: str) -> str:
-    """What is wrong with a value, to follow its place in a file; empty if ``said``, by msgspec, is of another matter."""
+    """What is wrong with a value, to follow its place in a file; empty if msgspec has ``said`` something else."""
     if kinds := re.fullmatch(r"Expected `([^`]*)`, got `(.*)`", said):
         wanted = " or ".join(_KINDS.get(kind, kind) for kind in kinds[1].split(" | ") if kind != "null")
         return f"is {_KINDS.get(kinds[2], f'a {kinds[2]}')}; it must be {wanted}"
