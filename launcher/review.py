@@ -103,8 +103,8 @@ def read_records(rrd: Path) -> list[tuple[float, str, AnyRecord]]:
                     records.extend((time_ns * 1e-9, peer, _decoder.decode(text)) for text in texts)
     except (RuntimeError, ValueError, KeyError) as problem:
         raise RecordingFault(
-            f"{rrd}: not a recording of a run by this version, or damaged ({problem}); remove it, and `sightline review` "
-            "merges it anew, or use the version that versions.json beside it names"
+            f"{rrd}: not a recording of a run by this version, or damaged ({problem}); remove it, and `sightline "
+            "review` merges it anew, or use the version that versions.json beside it names"
         ) from problem
     if not records:
         raise RecordingFault(f"{rrd}: no record of any peer in it; is it the recording of something else?")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from launcher.console import LONGEST_S, busy, check_option, complain, out, plainly, read_point, tell
-from launcher.scenario import ScenarioFault, find_scenario
+from launcher.scenario import ScenarioFault, find_scenario, packaged
 
 if TYPE_CHECKING:
     from launcher.report import Metrics
@@ -31,11 +31,12 @@ def demo(name: Name = None, duration_s: Duration = None) -> None:
 
 
 def run(
-    scenario: Annotated[str, typer.Argument(help="A TOML file, or the name of a scenario that comes with Sightline.")],
+    scenario: Annotated[str, typer.Argument(help=f"A TOML file, or one of {', '.join(packaged())}.")],
     name: Name = None,
     duration_s: Duration = None,
     chaos: Annotated[
-        Path | None, typer.Option(help="TOML file of faults that happen on a timetable, besides the scenario's own.")
+        Path | None,
+        typer.Option(help="TOML file of faults on a timetable, besides the scenario's own; see docs/faults.md."),
     ] = None,
 ) -> None:
     """Run a scenario with a process for each peer, watch it live, and leave a recording in runs/."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from launcher.console import LONGEST_S, busy, check_option, complain, err, out, plainly, print_json, tell
-from launcher.scenario import ScenarioFault, find_scenario
+from launcher.scenario import ScenarioFault, find_scenario, packaged
 
 if TYPE_CHECKING:
     from agents.recorder import RerunRecorder
@@ -23,14 +23,15 @@ AsJson = Annotated[bool, typer.Option("--json", help="Write JSON for programs.")
 
 
 def simulate(
-    scenario: Annotated[str, typer.Argument(help="A TOML file, or the name of a scenario that comes with Sightline.")],
+    scenario: Annotated[str, typer.Argument(help=f"A TOML file, or one of {', '.join(packaged())}.")],
     seeds: Annotated[int, typer.Option(help="Missions with this many seeds, 1 to 10000, from the scenario's on.")] = 1,
     duration_s: Annotated[
         float | None, typer.Option("--duration", help="Seconds, 1 to 86400, instead of the scenario's duration.")
     ] = None,
     record: Annotated[Path | None, typer.Option(help="Write the recording of the first mission (.rrd).")] = None,
     faults: Annotated[
-        Path | None, typer.Option(help="TOML file of faults that happen on a timetable, besides the scenario's own.")
+        Path | None,
+        typer.Option(help="TOML file of faults on a timetable, besides the scenario's own; see docs/faults.md."),
     ] = None,
     loss: Annotated[float | None, typer.Option(help="Share of messages that each peer misses, 0 to 1.")] = None,
     as_json: AsJson = False,
