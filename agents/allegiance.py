@@ -29,6 +29,9 @@ AT_ONCE_S: Final = float("-inf")
 
 TICK: Final = Tick()
 
+WORDS: Final = (Vote, VoteRequest)
+"""What is said in elections."""
+
 
 class Allegiance:
     """See the module. Times are of this peer's own clock, in seconds.
@@ -62,6 +65,7 @@ class Allegiance:
             roster, team=team, name=name, incarnation=incarnation, promise=promise, seed=seed, now_s=now_s
         )
         self.membership = Membership(roster, name, heartbeat_s)
+        self.is_there = self.membership.is_there
         self._election_s = self._membership_s = now_s
         self._office = Office(incarnation=incarnation, standing="", leads=None, obeys=None)
         """What was recorded last."""
@@ -70,7 +74,7 @@ class Allegiance:
     @property
     def next_s(self) -> float:
         """When something of election or membership is due."""
-        return min(self._election_s, self._membership_s)
+        return self._election_s if self._election_s < self._membership_s else self._membership_s
 
     @property
     def reign(self) -> Reign | None:
@@ -112,18 +116,15 @@ class Allegiance:
             warrant: of the order.
             now_s: when it arrived.
         """
-        reign = Reign(epoch=authority.epoch, leader=sender, incarnation=incarnation)
+        reign, before = Reign(epoch=authority.epoch, leader=sender, incarnation=incarnation), self.obeyed(now_s)
         refusal = self.election.obedience.take(kind, authority, reign, warrant, now_s)
-        self._election_s = AT_ONCE_S  # the election is to see whether another leader is obeyed by that
+        if self.obeyed(now_s) != before:
+            self._election_s = AT_ONCE_S  # the election is to see that another leader is obeyed by that
         return refusal
 
     def presence(self, peer: str) -> Presence:
         """Whether a peer is there."""
         return self.membership.presence(peer)
-
-    def latest_incarnation(self, peer: str) -> int:
-        """Of a peer, as far as is known; -1 before anything is."""
-        return self.membership.incarnation(peer)
 
     def handle(self, event: Event, now_s: float) -> Iterable[Effect]:
         """Pass an event on to election and membership, if it is for them or they are due, and do what they want."""
@@ -135,7 +136,7 @@ class Allegiance:
                 self._membership_s = self.membership.due_s
             else:
                 self._join(self.membership.handle(core.Heard(peer, incarnation, body), now_s))
-            if isinstance(body, Vote | VoteRequest):
+            if isinstance(body, WORDS):
                 word = core.Heard(peer, incarnation, body)
         elif isinstance(event, PeerAppeared | PeerVanished):
             self._join(self.membership.handle(event, now_s))

@@ -11,6 +11,7 @@ from agents.collection import Collection
 from agents.mission import Mission
 from agents.network import judge_network
 from agents.records import Connectivity
+from agents.rhythm import EARLY_S
 from agents.role import Effect, Event, Record, Woken
 from agents.self_report import SelfReport
 from agents.standing_orders import StandingOrders
@@ -50,7 +51,7 @@ class BaseStation:
 
     def handle(self, event: Event, now_s: float) -> Iterable[Effect]:
         """Say and record where it is, and who sees whom."""
-        if not isinstance(event, Woken):
+        if not isinstance(event, Woken) or now_s < self.next_s - EARLY_S:
             return ()
         latest = self._orders.latest
         state = State(

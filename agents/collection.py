@@ -14,7 +14,6 @@ from itertools import groupby, takewhile
 from agents.allegiance import Allegiance
 from agents.retreat import MEMORY
 from agents.role import Effect, Event, Heard
-from protocol.membership import Presence
 from protocol.messages import Intent, Point, State
 
 
@@ -38,7 +37,7 @@ class Collection:
     next_s = float("inf")
 
     def __init__(self, allegiance: Allegiance, agent: str) -> None:
-        self._allegiance = allegiance
+        self._is_there = allegiance.is_there
         self._agent = agent
         self._known: dict[str, Known] = {}
         self._behind: dict[str, deque[Point]] = {}
@@ -61,22 +60,25 @@ class Collection:
         if _plan(now) is None or known is None or not isinstance(known.body, State) or _plan(known.body) != _plan(now):
             behind.clear()
         elif not _turned(now):
-            ahead = set(now.path[1:])
             if not behind:
                 behind.append(known.body.position)
-            behind.extend(takewhile(lambda place: place not in ahead, known.body.path[1:]))
+            if known.body.path[1:2] != now.path[1:2]:
+                ahead = set(now.path[1:])
+                behind.extend(takewhile(lambda place: place not in ahead, known.body.path[1:]))
 
     def body(self, peer: str) -> State | Intent | None:
         """What a peer says of itself; None if it is not there, or this process of it has said nothing yet."""
         known = self._known.get(peer)
-        if known is None or self._allegiance.presence(peer) is not Presence.PRESENT:
+        if known is None or not self._is_there(peer, known.incarnation):
             return None
-        return known.body if known.incarnation == self._allegiance.latest_incarnation(peer) else None
+        return known.body
 
     def state(self, robot: str) -> State | None:
         """What a robot or the base station says of itself, as :meth:`body`."""
-        body = self.body(robot)
-        return body if isinstance(body, State) else None
+        known = self._known.get(robot)
+        if known is None or not isinstance(known.body, State) or not self._is_there(robot, known.incarnation):
+            return None
+        return known.body
 
     def intent(self) -> Intent | None:
         """What the agent says of itself, as :meth:`body`."""

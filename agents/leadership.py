@@ -10,6 +10,7 @@ election free of what leading needs.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import Final, Protocol
@@ -84,12 +85,15 @@ class Leadership:
     @property
     def next_s(self) -> float:
         """When there is something to do."""
-        if self._allegiance.reign != (None if self._duty is None else self._duty.reign):
-            return AT_ONCE_S
-        return float("inf") if self._duty is None else self._duty.next_s
+        reign, duty = self._allegiance.reign, self._duty
+        if duty is None:
+            return math.inf if reign is None else AT_ONCE_S
+        return duty.next_s if reign == duty.reign else AT_ONCE_S
 
     def handle(self, event: Event, now_s: float) -> Iterable[Effect]:
         """Take up or leave the office; lead."""
+        if self._prepared and self._duty is None and self._asked is None and self._allegiance.reign is None:
+            return ()
         effects: list[Effect] = []
         if not self._prepared:
             self._prepared = True

@@ -27,6 +27,7 @@ from agents.driver import patience_s
 from agents.mission import Mission
 from agents.path_follower import ASTRAY_M, STANDING, Leg
 from agents.records import LogLine
+from agents.rhythm import EARLY_S
 from agents.role import Compute, Drive, Effect, Event, Heard, JobDone, Record, Woken
 from agents.self_report import SelfReport
 from agents.stage_follower import StageFollower
@@ -83,6 +84,8 @@ class Robot:
         self._report = SelfReport(mission, "robot", mission.robot_radius_m, now_s)
         self._wake_s = now_s
         self._mode: Mode = "waiting"
+        self._obeys = False
+        """Whether it did, and had orders that it follows, when that was looked at last."""
         self._orders: Deployment | None = None
         """Taken last, in force or not."""
         self._followed: Reign | None = None
@@ -102,15 +105,24 @@ class Robot:
 
     @property
     def next_s(self) -> float:
-        """When something is due; at once if there are new orders or there is another leader."""
-        news = self._standing.latest is not self._orders or self._allegiance.followed != self._followed
-        return AT_ONCE_S if news else self._wake_s
+        """When something is due; at once if orders tell it anything new, or there is another leader."""
+        followed = self._allegiance.followed
+        if followed is not self._followed and followed != self._followed:
+            return AT_ONCE_S
+        latest = self._standing.latest
+        if latest is not self._orders and (not self._obeys or _task(latest) != _task(self._orders)):
+            return AT_ONCE_S
+        if not self._obeys:
+            return self._wake_s
+        until_s = self._allegiance.obeyed_until_s
+        return until_s if until_s < self._wake_s else self._wake_s
 
     def handle(self, event: Event, now_s: float) -> Iterable[Effect]:
         """Hear of the others' progress; decide and move when woken."""
         match event:
             case Woken(position):
-                return self._live(now_s, position)
+                if now_s >= self.next_s - EARLY_S:
+                    return self._live(now_s, position)
             case Heard(_, envelope) if isinstance(envelope.body, State):
                 progress = envelope.body.progress
                 if self._follower.retreat is not None:
@@ -131,7 +143,7 @@ class Robot:
 
     def _live(self, now_s: float, position: Point) -> list[Effect]:
         self._orders, self._followed = self._standing.latest, self._allegiance.followed
-        obeys = self._obey(now_s, position)
+        obeys = self._obeys = self._obey(now_s, position)
         obeyed_s = self._allegiance.obeyed_until_s - now_s
         if obeys:
             self._leg = self._follower.steer(position)
@@ -141,7 +153,8 @@ class Robot:
             self._leg = self._go_back(now_s, position) if -obeyed_s >= self._retreat_after_s else STANDING
             drives_s = self._patience_s
         self._settle_mode(obeys, now_s)
-        self._effects.append(Drive(self._leg.velocity, min(self._leg.lasts_s, drives_s)))
+        drives_s = min(self._leg.lasts_s, drives_s)
+        self._effects.append(Drive(self._leg.velocity, drives_s))
         self.state = State(
             position=position,
             velocity=self._leg.velocity,
@@ -156,7 +169,9 @@ class Robot:
         news = (self.state.progress, self.state.refusing, self.state.mode == "holding", epoch)
         self._effects += self._report.due(now_s, self.state, urgent=news != self._said)
         self._said = news
-        self._wake_s = self._next_wake_s(now_s)
+        self._wake_s = self._report.next_s
+        if drives_s > 0.0:
+            self._wake_s = min(self._wake_s, now_s + drives_s)
         effects, self._effects = self._effects, []
         return effects
 
@@ -267,12 +282,16 @@ class Robot:
             others = ", ".join(self._follower.waits_for()) or "more to be released"
             self._log("info", f"has been waiting for {others} for {LONG_S:g} s")
 
-    def _next_wake_s(self, now_s: float) -> float:
-        wake_s = self._report.next_s
-        return min(wake_s, now_s + self._leg.lasts_s) if self._leg.lasts_s > 0.0 else wake_s
-
     def _log(self, level: Literal["info", "warning"], text: str) -> None:
         self._effects.append(Record(LogLine(level=level, text=text)))
+
+
+def _task(orders: Deployment | None) -> tuple[int, ...]:
+    """What orders tell a robot; while that is the same, their repetition only prolongs them."""
+    if orders is None or orders.motion is None:
+        return () if orders is None else (orders.authority.epoch,)
+    motion = orders.motion
+    return orders.authority.epoch, motion.plan, motion.revision, motion.released, motion.first_stage
 
 
 def _key(epoch: int, motion: Motion) -> tuple[int, int, int]:

@@ -58,18 +58,20 @@ class RollCall:
         Returns:
             Whether anybody is new or lost; and who has been given up now.
         """
-        before = set(self.states)
+        before = self.states.keys() | ()
         for robot in self._robots:
-            self._look_at(robot, now_s)
+            own = self._body if robot == self._name else None
+            state = self._collection.state(robot) if own is None else own.state
+            if state is not self.states.get(robot) or robot in self._deaf:
+                self._look_at(robot, state, now_s)
         given_up = self._dispatcher.deaf(now_s)
         for robot in given_up:
             self._deaf[robot] = authority
             self._lose(robot)
-        return before != set(self.states), given_up
+        return before != self.states.keys(), given_up
 
-    def _look_at(self, robot: str, now_s: float) -> None:
-        own = self._body if robot == self._name else None
-        state = self._collection.state(robot) if own is None else own.state
+    def _look_at(self, robot: str, state: State | None, now_s: float) -> None:
+        """See to a robot of which there is news, or that did not answer."""
         if robot in self._deaf and (state is None or has_heard(state, self._deaf[robot])):
             del self._deaf[robot]
         if state is None or robot in self._deaf:

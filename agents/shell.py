@@ -40,8 +40,10 @@ from protocol.messages import AnyBody, Envelope, Goal, MalformedMessage, address
 MAXIMUM_OPERATORS: Final = 64
 """Operators remembered at a time. Their names are not on the roster, so that the memory must be bounded."""
 
+MAXIMUM_KEYS: Final = 1024
+"""Keys remembered at a time: those of operators are without end."""
+
 _address: Final = lru_cache(maxsize=1024)(parse)
-_route: Final = lru_cache(maxsize=1024)(route)
 """The same few keys come again and again."""
 
 Refusal: TypeAlias = str
@@ -124,6 +126,8 @@ class PeerShell:
         self._persist = persist
         self._read = read
         self._sequence = 0
+        self._listened: dict[str, Address] = {}
+        """Addresses of the keys that it has heard something under."""
         self._heard: dict[tuple[str, str], tuple[int, int]] = {}
         self._incarnations: dict[str, int] = {}
         """The latest one heard of each peer: it has replaced all before, whatever they said last and of what kind."""
@@ -140,14 +144,16 @@ class PeerShell:
     def take(self, event: BusEvent) -> None:
         """Pass an event of the bus on to the role, if it is fit for it."""
         if isinstance(event, Received):
-            kind, to = _route(event.key)
-            if kind not in self._role.hears or to not in ("", self._name):
-                return  # most of the traffic: not worth a closer look
-            verdict = self._examine(event)
-            if not isinstance(verdict, str):
-                self._tell(verdict, self._now())
-            elif verdict:
-                self._refuse(event.key, verdict)
+            address = self._listened.get(event.key) or self._listen(event.key)
+            if address is None:
+                return
+            message = self._read(event)
+            if isinstance(message, str):
+                self._refuse(event.key, message)
+            elif self._is_news(address, message.envelope):
+                self._tell(message, self._now())
+            else:
+                self._refuse(event.key, "stale")
         elif event.peer in self._peers and event.peer != self._name:
             self._tell(event, self._now())
 
@@ -170,19 +176,22 @@ class PeerShell:
         if self.wake_at_s == math.inf:
             self.wake_at_s = now_s + RETRY_S
 
-    def _examine(self, publication: Received) -> Heard | Refusal:
-        """The message of a publication, or why it is refused; empty for one's own echo."""
-        address = _address(publication.key)
+    def _listen(self, key: str) -> Address | None:
+        """The address of a key that has not been looked at yet, if what is under it is for this peer."""
+        address = _address(key)
+        kind, to = (address.kind, address.to) if address is not None else route(key)
+        if kind not in self._role.hears or to not in ("", self._name):
+            return None  # most of the traffic: not worth a closer look
         if address is None or address.team != self._team:
-            return "foreign"
-        if address.speaker == self._name and not address.operator:
-            return ""
-        if not address.operator and address.speaker not in self._peers:
-            return "stranger"
-        message = self._read(publication)
-        if isinstance(message, str) or self._is_news(address, message.envelope):
-            return message
-        return "stale"
+            self._refuse(key, "foreign")
+        elif address.operator or address.speaker in self._peers - {self._name}:
+            if len(self._listened) >= MAXIMUM_KEYS:
+                self._listened.clear()
+            self._listened[key] = address
+            return address
+        elif address.speaker != self._name:  # else it is one's own echo
+            self._refuse(key, "stranger")
+        return None
 
     def _is_news(self, address: Address, envelope: Envelope) -> bool:
         """Whether this is later than all that the sender has said of this kind; remembers it if so."""
@@ -222,17 +231,17 @@ class PeerShell:
 
     def _carry_out(self, effects: Iterable[Effect], now_s: float) -> None:
         for effect in effects:  # the most frequent first
-            if isinstance(effect, WakeAt):
+            if type(effect) is WakeAt:
                 self.wake_at_s = effect.time_s
-            elif isinstance(effect, Publish):
+            elif type(effect) is Publish:
                 self._publish(effect.body)
-            elif isinstance(effect, Record):
+            elif type(effect) is Record:
                 self._record(now_s, effect.record)
-            elif isinstance(effect, Drive):
+            elif type(effect) is Drive:
                 self._driver.drive(effect.velocity, effect.for_s)
-            elif isinstance(effect, Compute):
+            elif type(effect) is Compute:
                 self._execute(effect)
-            else:
+            elif type(effect) is Persist:
                 self._persist(effect)
 
     def _publish(self, body: AnyBody) -> None:

@@ -182,6 +182,8 @@ class TeamTree:
 
     def handle(self, event: Event, now_s: float) -> Iterable[Effect]:
         """Take up or leave the office, hear words and answers, judge links, and say what is due."""
+        if self._reign is None and self._allegiance.reign is None and _answers(event):
+            return ()  # most of what is heard: it is for the leader
         self._news = False
         self._follow_office(now_s)
         match event:
@@ -329,7 +331,7 @@ class TeamTree:
     def _confirm(self, now_s: float) -> None:
         """Say the standing answer if it is another one, or due; the leader takes its own as any other."""
         answer = self.held.confirmation
-        if answer == self._answer and now_s < self._answer_at_s:
+        if now_s < self._answer_at_s and (answer is self._answer or answer == self._answer):
             return
         if answer != self._answer:
             self._effects.append(Record(_describe(answer)))
@@ -355,3 +357,8 @@ def _describe(answer: Confirmation) -> TreeAnswer:
         confirmed=tuple(view.peer for view in answer.views if view.verdict != "refuses"),
         kept=None if answer.committed is None else answer.committed.number,
     )
+
+
+def _answers(event: Event) -> bool:
+    """Whether it is an answer to the leader."""
+    return isinstance(event, Heard) and isinstance(event.envelope.body, Confirmation)

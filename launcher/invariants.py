@@ -8,6 +8,7 @@ bodies in :mod:`launcher.body_rules`; how soon a team recovers is for :mod:`laun
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Final, Protocol
 
@@ -19,6 +20,7 @@ from launcher.body_rules import BodyRules
 from launcher.fault_timetable import Kill, Timetable
 from launcher.kept_memory import count_kept
 from launcher.order_rules import MotionRules, OrderRules
+from launcher.set_rules import SetRules
 from launcher.simulated_peer import SimulatedPeer, holds_lease, read_shared
 from launcher.simulation import SimulatedTeam
 from launcher.tree_rules import TreeRules
@@ -28,10 +30,7 @@ from protocol.inbox import Inbox
 from protocol.keys import route
 from protocol.messages import Envelope, Reign
 
-LOOK_S: Final = 0.5
-"""How often it is looked what peers know. A set that lost the agent has mostly not grown back to it by then."""
-
-COUNT_S: Final = 10.0
+COUNT_S: Final = 12.5
 """How often it is counted what they keep."""
 
 MOST_KEPT: Final[Mapping[type[object], int]] = {
@@ -69,15 +68,16 @@ class Invariants:
     def __init__(self, mission: Mission, team: SimulatedTeam, faults: Timetable) -> None:
         keeps_disks = not any(isinstance(fault, Kill) and fault.disk == "lost" for fault in faults.faults)
         self._team = team
-        self._agent = team.peers[mission.tracked_agent.name]
         self._rules: Sequence[Rules] = (OfficeRules(team.peers, keeps_disks), OrderRules(keeps_disks))
         if keeps_disks:
             self._rules += (MotionRules(team.peers), TreeRules(mission.voters.voters))
+        if not mission.announces:
+            self._rules += (SetRules(mission, team),)
+        self._looks = [rules.look for rules in self._rules]
         self._found: Violation | None = None
         for peer in team.peers.values():
             peer.said, peer.watch = self._hear, self._look
         BodyRules(mission, team)
-        team.time.call_at(LOOK_S, self._look_at_sets)
         team.time.call_at(COUNT_S, self._look_at_memory)
 
     def _hear(self, peer: SimulatedPeer, key: str, payload: bytes) -> None:
@@ -96,18 +96,11 @@ class Invariants:
     def _look(self, peer: SimulatedPeer) -> None:
         if self._found is not None:
             raise self._found
-        if peer.shell is not None and peer.shell.faults:
+        shell = peer.shell
+        if shell is not None and shell.faults:
             raise Violation("roles fail on nothing", f"{peer.name} failed on an event: see its log")
-        for rules in self._rules:
-            rules.look(peer)
-
-    def _look_at_sets(self) -> None:
-        place = self._agent.place
-        for peer in self._team.peers.values():
-            estimate = peer.part(SharedEstimate)
-            if estimate is not None and not estimate.contains(place, peer.now_s):
-                raise Violation("the agent is inside every set", f"it is at {place}, and not for {peer.name}")
-        self._team.time.call_at(self._team.time.now_s + LOOK_S, self._look_at_sets)
+        for look in self._looks:
+            look(peer)
 
     def _look_at_memory(self) -> None:
         for peer in self._team.peers.values():
@@ -116,6 +109,10 @@ class Invariants:
                 if kept is not None and (count := count_kept(kept)) > most:
                     raise Violation("memory is bounded", f"{kind.__name__} of {peer.name} keeps {count} things")
         self._team.time.call_at(self._team.time.now_s + COUNT_S, self._look_at_memory)
+
+
+_NEVER: Final = (None, math.nan, None, math.nan)
+"""Before a peer's lease and obedience have been looked at."""
 
 
 class OfficeRules:
@@ -128,7 +125,7 @@ class OfficeRules:
 
     def __init__(self, peers: Mapping[str, SimulatedPeer], keeps_disks: bool) -> None:
         self._peers, self._keeps_disks = peers, keeps_disks
-        self._known: dict[str, object] = {}
+        self._known: dict[str, tuple[object, float, object, float]] = {}
         """What each peer's lease and obedience were when they were looked at last."""
         self._last: Reign | None = None
         """The last reign that began."""
@@ -141,11 +138,16 @@ class OfficeRules:
         own = peer.allegiance
         if own is None:
             return
-        election = own.election
-        now = (election.office, election.lease_until_s, election.obedience.last, election.obedience.until_s)
-        if self._known.get(peer.name) == now:
+        election, obedience = own.election, own.election.obedience
+        office, lease_s, last, until_s = self._known.get(peer.name, _NEVER)
+        if (
+            until_s == obedience.until_s
+            and lease_s == election.lease_until_s
+            and last is obedience.last
+            and office is election.office
+        ):
             return
-        self._known[peer.name] = now
+        self._known[peer.name] = election.office, election.lease_until_s, obedience.last, obedience.until_s
         leads, obeyed = holds_lease(peer), _obeyed(peer)
         if leads and election.office != self._last:
             self._begin(election.office)

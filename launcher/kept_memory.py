@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping, Sequence, Set
-from typing import Any, Final
+from collections.abc import Callable, Iterable, Mapping, Set
+from functools import cache
+from itertools import chain
+from typing import Any, Final, TypeAlias
 
 from agents.casting import Casting
 from agents.mission import Mission
@@ -13,40 +15,46 @@ from protocol.roster import Roster
 OURS: Final = ("agents.", "protocol.", "estimation.")
 """Objects of these packages are looked into; maps, arrays and the rest of the world are not the mind's."""
 
-CONTAINERS: Final = (dict, list, tuple, Set, Mapping, deque)
-
 PLAIN: Final = frozenset({str, bytes, int, float, bool, type(None)})
 """Types in which nothing is kept."""
 
 SHARED: Final = (Mission, Roster, Casting)
 """What all peers of a simulation have in common; of planners a mind keeps but a way to ask for them."""
 
+Look: TypeAlias = Callable[[Any], Iterable[Any]]
+
 
 def count_kept(root: object) -> int:
     """Number of things in the containers that an object keeps, each container once. O(what it keeps)."""
-    count, seen, ahead = 0, set[int](), [root]
+    ahead: list[Any] = [root]
+    count, seen = 0, set[int]()
     while ahead:
         thing = ahead.pop()
         if id(thing) in seen:
             continue
         seen.add(id(thing))
-        if isinstance(thing, CONTAINERS):
+        is_container, look = _how_to_look(thing.__class__)
+        if is_container:
             count += len(thing)
-        ahead += [other for other in _inside(thing) if type(other) not in PLAIN]
+        if look is not None:
+            ahead += [other for other in look(thing) if type(other) not in PLAIN]
     return count
 
 
-def _inside(thing: Any) -> Sequence[Any]:
-    kind = type(thing)
-    if kind is tuple or kind is list:
-        return thing  # type: ignore[no-any-return]
-    if isinstance(thing, Mapping):
-        return [*thing.keys(), *thing.values()]
-    if isinstance(thing, CONTAINERS):
-        return list(thing)
-    if not kind.__module__.startswith(OURS) or isinstance(thing, SHARED):
-        return []
+@cache
+def _how_to_look(kind: type[Any]) -> tuple[bool, Look | None]:
+    """Whether things of a type are containers, and what gives all that they keep; None: that is not looked for."""
+    if issubclass(kind, Mapping):
+        return True, lambda thing: chain(thing.keys(), thing.values())
+    if issubclass(kind, (list, tuple, Set, deque)):
+        return True, iter
+    if not kind.__module__.startswith(OURS) or issubclass(kind, SHARED):
+        return False, None
     if hasattr(kind, "__struct_fields__"):
-        return [getattr(thing, field) for field in kind.__struct_fields__]
+        fields = kind.__struct_fields__
+        return False, lambda thing: [getattr(thing, field) for field in fields]
     slots = [slot for base in kind.__mro__ for slot in getattr(base, "__slots__", ())]
-    return [*getattr(thing, "__dict__", {}).values(), *(getattr(thing, slot, None) for slot in slots)]
+    return False, lambda thing: [
+        *getattr(thing, "__dict__", {}).values(),
+        *(getattr(thing, slot, None) for slot in slots),
+    ]

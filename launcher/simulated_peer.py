@@ -313,7 +313,8 @@ class SimulatedPeer:
             self.inbox = Inbox()
         if self.watch is not None:
             self.watch(self)
-        self._sleep()
+        if self.shell is not None and self.shell.wake_at_s != self._due_s:
+            self._sleep()
 
     def _execute(self, job: Compute) -> None:
         result, failure = None, ""

@@ -27,6 +27,8 @@ class HeldTree:
         """The last word that was taken."""
         self._name = name
         self._views: dict[str, LinkView] = {}
+        self._confirmation: Confirmation | None = None
+        """The standing answer, once it has been asked for."""
 
     @property
     def links(self) -> tuple[Edge, ...]:
@@ -35,10 +37,10 @@ class HeldTree:
 
     def take(self, word: Topology) -> str:
         """Learn what is in force and what is proposed; says what is wrong with the word, nothing if all is well."""
-        self.latest = word
+        self.latest, self._confirmation = word, None
         tree, proposal = word.committed, word.proposal
         for stated in (tree, proposal.tree if proposal is not None else None):
-            if stated is not None and (fault := find_fault(stated)):
+            if stated is not None and stated != self.committed and (fault := find_fault(stated)):
                 return f"tree {stated.number[1]} of epoch {stated.number[0]} is none: {fault}"
         if tree is not None and (self.committed is None or tree.number > self.committed.number):
             self.committed = tree
@@ -63,14 +65,17 @@ class HeldTree:
         What has been said of a link stays said: the other end, and the leader, rely on it.
         """
         if self.proposal is not None and self.proposal.tree.number == number:
+            self._confirmation = None
             for view in views:
                 self._views.setdefault(view.peer, view)
 
     @property
     def confirmation(self) -> Confirmation:
         """The standing answer."""
-        return Confirmation(
-            proposal=None if self.proposal is None else self.proposal.tree.number,
-            views=tuple(self._views.values()),
-            committed=self.committed,
-        )
+        if self._confirmation is None:
+            self._confirmation = Confirmation(
+                proposal=None if self.proposal is None else self.proposal.tree.number,
+                views=tuple(self._views.values()),
+                committed=self.committed,
+            )
+        return self._confirmation

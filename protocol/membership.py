@@ -150,6 +150,11 @@ class Membership:
         known = self._known.get(peer)
         return known.incarnation if known is not None else -1
 
+    def is_there(self, peer: str, incarnation: int) -> bool:
+        """Whether another peer is present, and this is its latest incarnation."""
+        known = self._known.get(peer)
+        return known is not None and known.presence is Presence.PRESENT and known.incarnation == incarnation
+
     def _learn(self, known: _Known, event: Heard | PeerAppeared | PeerVanished, now_s: float) -> list[Effect]:
         match event:
             case PeerAppeared(peer):

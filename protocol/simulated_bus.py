@@ -41,10 +41,10 @@ class VirtualTime:
         Raises:
             ValueError: the time is not a finite number.
         """
-        if not math.isfinite(time_s):
+        if not -math.inf < time_s < math.inf:
             raise ValueError(f"cannot call a function at {time_s} s: the time must be finite")
         self._asked += 1
-        heappush(self._due, (max(time_s, self.now_s), self._asked, function, arguments))
+        heappush(self._due, (time_s if time_s > self.now_s else self.now_s, self._asked, function, arguments))
 
     def run_until(self, time_s: float) -> None:
         """Run all that is due until ``time_s`` inclusive, also what is asked for on the way; then it is that time.
@@ -137,8 +137,8 @@ class SimulatedNetwork:
         self._attachments = 0
         self._attached: dict[str, SimulatedBus] = {}
         self._links: dict[tuple[str, str], Link] = {}
-        self._routes: dict[tuple[str, str, str], list[tuple[Link, SimulatedBus]]] = {}
-        """By speaker, kind and addressee; of those that are attached now."""
+        self._routes: dict[tuple[str, str], list[tuple[Link, SimulatedBus]]] = {}
+        """By speaker and key; of those that are attached now."""
 
     def attach(
         self, peer: str, deliver: Deliver, *, operator: bool = False, kinds: Collection[str] | None = None
@@ -214,10 +214,10 @@ class SimulatedNetwork:
 
     def _publish(self, sender: SimulatedBus, publication: Received) -> None:
         self.published += 1
-        kind, to = route(publication.key)
-        routes = self._routes.get((sender.peer, kind, to))
+        routes = self._routes.get((sender.peer, publication.key))
         if routes is None:
-            routes = self._routes[sender.peer, kind, to] = [
+            kind, to = route(publication.key)
+            routes = self._routes[sender.peer, publication.key] = [
                 (self._link(sender.peer, other.peer), other)
                 for other in self._attached.values()
                 if other is not sender

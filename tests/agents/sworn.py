@@ -45,8 +45,8 @@ class Sworn(Allegiance):
     def presence(self, peer: str) -> Presence:
         return Presence.GONE if peer in self.gone else Presence.PRESENT
 
-    def latest_incarnation(self, _peer: str) -> int:
-        return 0
+    def is_there(self, peer: str, _incarnation: int) -> bool:
+        return peer not in self.gone
 
     def take(
         self, _kind: str, authority: Authority, sender: str, incarnation: int, _warrant: Warrant, now_s: float

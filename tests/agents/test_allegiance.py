@@ -213,7 +213,8 @@ def test_who_comes_goes_and_is_started_again_is_logged() -> None:
     assert world.part.presence("robot2") is Presence.PRESENT
     world.now_s = 0.1
     world.hear("robot2", beat, incarnation=1)
-    assert world.part.latest_incarnation("robot2") == 1
+    assert world.part.is_there("robot2", 1)
+    assert not world.part.is_there("robot2", 0)
     world.live_until(3.0)
     assert world.part.presence("robot2") is Presence.SILENT
     world.give(PeerVanished("robot2"))

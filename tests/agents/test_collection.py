@@ -9,7 +9,6 @@ import pytest
 from agents.collection import Collection
 from agents.role import Heard
 from protocol.keys import Address
-from protocol.membership import Presence
 from protocol.messages import Envelope, Point, Progress, State
 
 CORNERS: tuple[Point, ...] = ((0.0, 0.0), (2.0, 0.0), (2.0, 3.0), (5.0, 3.0))
@@ -21,11 +20,8 @@ class Attendance:
     def __init__(self, *there: str) -> None:
         self.there = set(there)
 
-    def presence(self, peer: str) -> Presence:
-        return Presence.PRESENT if peer in self.there else Presence.GONE
-
-    def latest_incarnation(self, _peer: str) -> int:
-        return 0
+    def is_there(self, peer: str, _incarnation: int) -> bool:
+        return peer in self.there
 
 
 def state(position: Point, path: tuple[Point, ...] = (), *, plan: int = 1, retreat: int | None = None) -> State:
