@@ -44,18 +44,18 @@ def shown(mission: Mission, console: Console) -> Iterator[Callable[[Status, floa
         nonlocal said
         if now_s >= said[0] + LINE_S or status.chain_connected != said[1]:
             said = (now_s, status.chain_connected)
-            tell(describe(status, now_s), console)
+            tell(describe(status, mission, now_s), console)
 
     yield say
 
 
-def describe(status: Status, now_s: float) -> str:
+def describe(status: Status, mission: Mission, now_s: float) -> str:
     """The team in one line."""
     up = f"{now_s:6.1f} s  {status.up}/{len(status.peers)} up"
     if status.deployment is None:
         return f"{up}, starting"
     chain = f"{_chain(status)} {'connected' if status.chain_connected else 'broken'}"
-    leads = f", {_leader(status) or 'nobody'} leads"
+    leads = f", {_leads(status, mission)}"
     sight = "" if status.chain_connected else ", agent visible" if status.agent_visible else ", agent out of sight"
     if status.agent_visible is None:
         sight = f", agent {_whereabouts(status)}"
@@ -72,8 +72,7 @@ def draw(status: Status, mission: Mission, now_s: float) -> Table:
     sight = Text("agent visible", "green") if status.agent_visible else Text("agent out of sight", "red")
     if status.agent_visible is None:
         sight = Text(f"agent {_whereabouts(status)}")
-    leader = _leader(status)
-    leads = Text(f"{leader} leads") if leader else Text("nobody leads", "bold red")
+    leads = Text(_leads(status, mission), "" if _leader(status) else "bold red")
     words = [Text("starting", "dim")] if status.deployment is None else [leads, chain, sight]
     table = Table(
         title=Text(" · ").join([Text(f"{mission.team}  {now_s:.0f}{length}"), *words]),
@@ -114,6 +113,17 @@ def _chain(status: Status) -> str:
 def _leader(status: Status) -> str | None:
     """Who leads; nobody, if it is not there, though its lease may still run."""
     return status.leader if any(peer.up and peer.name == status.leader for peer in status.peers) else None
+
+
+def _leads(status: Status, mission: Mission) -> str:
+    """Who leads; if nobody can, why."""
+    if leader := _leader(status):
+        return f"{leader} leads"
+    voters = mission.voters
+    there = sum(peer.up for peer in status.peers if peer.name in voters.voters)
+    if there >= voters.majority:
+        return "nobody leads"
+    return f"nobody leads ({there} of {len(voters.voters)} voters up, {voters.majority} needed)"
 
 
 def _relays(status: Status) -> str:

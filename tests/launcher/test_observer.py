@@ -160,7 +160,9 @@ def test_an_independent_agent_is_where_the_ranges_say(mission: Mission) -> None:
     view.handle(said("robot1", state((1.0, 3.5)), sequence=2), 1.1)
     status = view.status(1.1)
     assert status.chain_connected
-    assert ", chain to the relays connected, agent within" in describe(status, 1.1), "nobody knows of the agent"
+    assert ", chain to the relays connected, agent within" in describe(status, mission, 1.1), (
+        "nobody knows of the agent"
+    )
     console = Console(width=120, record=True, file=io.StringIO())
     console.print(draw(status, mission, 1.1))
     assert "m² at" in console.export_text()
@@ -190,7 +192,7 @@ def test_the_display_says_it_in_a_line_and_in_a_table(view: TeamView, mission: M
     view.handle(said("agent", intent((2.0, 1.0), goal=(8.0, 2.0))), 0.0)
     view.handle(said("base", deployment(1), sequence=1), 0.0)
     status = view.status(0.0)
-    assert describe(status, 12.34) == (
+    assert describe(status, mission, 12.34) == (
         "  12.3 s  2/4 up, base leads, chain connected, 1 relay, 1 line of sight, agent to 8.0, 2.0"
     )
     console = Console(width=100, record=True, file=io.StringIO())
@@ -200,4 +202,8 @@ def test_the_display_says_it_in_a_line_and_in_a_table(view: TeamView, mission: M
         assert word in text
     view.handle(PeerVanished("base"), 0.1)
     assert view.leader(0.1) == "base", "its lease runs"
-    assert ", nobody leads, chain broken" in describe(view.status(0.1), 0.1)
+    nobody = "nobody leads (0 of 3 voters up, 2 needed), chain broken"
+    assert nobody in describe(view.status(0.1), mission, 0.1)
+    for robot in ("robot1", "robot2"):
+        view.handle(said(robot, state((1.0, 2.0))), 0.1)
+    assert ", nobody leads, chain broken" in describe(view.status(0.1), mission, 0.1), "they will elect one of them"
