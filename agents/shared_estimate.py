@@ -96,7 +96,8 @@ class SharedEstimate:
         """Whether it has yet to hear what others have; from when on it says a digest out of turn."""
         self._recording = Rhythm(RECORD_S, 0.0)
         self._own: deque[TimedRange] = deque(maxlen=REPEATED)
-        self._newest_s = -math.inf
+        self.newest_s = -math.inf
+        """When the newest range was measured that it knows of."""
         self._said_s = -math.inf
         self._refused = 0
 
@@ -138,13 +139,13 @@ class SharedEstimate:
             return ()
         self._said_s = max(now_s, self._said_s)
         self._own.append(self._ranges.record(self._said_s, anchor, range_m, bound_m))
-        self._newest_s = max(self._newest_s, self._said_s)
+        self.newest_s = max(self.newest_s, self._said_s)
         return (Publish(Ranges(ranges=tuple(map(range_to_wire, self._own)))),)
 
     def target(self, now_s: float) -> TargetSet | None:
         """Where the agent may be, as this peer knows; None before it has heard of any range."""
         sketch = self._ranges.state_at(now_s).sketch
-        return None if sketch is None else replace(sketch, time_s=now_s, newest_s=self._newest_s)
+        return None if sketch is None else replace(sketch, time_s=now_s, newest_s=self.newest_s)
 
     def contains(self, point: Point, now_s: float) -> bool:
         """Whether the agent may be at a point; anywhere before any range."""
@@ -191,7 +192,7 @@ class SharedEstimate:
         self._refused += len(said.ranges) - len(fit)
         self._debts.settle((record.peer, record.number) for record in fit)
         if self._ranges.receive(fit, now_s):
-            self._newest_s = max(self._newest_s, *(record.time_s for record in fit))
+            self.newest_s = max(self.newest_s, *(record.time_s for record in fit))
 
     def _compare(self, peer: str, start: int, said: RangeDigest, now_s: float) -> None:
         """Owe a peer what it lacks by its digest."""
@@ -218,7 +219,7 @@ class SharedEstimate:
             return
         self._debts.settle([BASE])
         if self._ranges.adopt(base):
-            self._newest_s = max(self._newest_s, base.key[0])
+            self.newest_s = max(self.newest_s, base.key[0])
 
     def _answer(self, now_s: float) -> Iterator[Effect]:
         """Say what others lack, if it is this peer's turn."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from launcher.fault_timetable import Clock, Cut, Delay, Disk, Fault, Kill, Loss, Partition, Pause
+from launcher.fault_timetable import Clock, Cut, Delay, Disk, Fault, Kill, Partition, Pause
 from tests.faults.chaos_mission import ChaosCase
 
 
@@ -47,10 +47,9 @@ CASES: Final[dict[str, tuple[str, ChaosCase]]] = {
     "says_before_it_is_written": (
         "epochs rise",
         _case(
-            6.0,
-            *(Disk(at_s=0.0, for_s=0.9, who=name, takes_s=1.5) for name in VOTERS),
-            *(Kill(at_s=1.0, for_s=0.5, who=name) for name in VOTERS),
-            seed=6,
+            12.0,
+            *(Disk(at_s=0.0, who=name, takes_s=3.0, full=True) for name in VOTERS),
+            *(Kill(at_s=1.3 + 2.0 * time, for_s=0.2, who=name) for time in range(5) for name in VOTERS),
         ),
     ),
     "does_not_write_its_own_vote": (
@@ -118,11 +117,15 @@ CASES: Final[dict[str, tuple[str, ChaosCase]]] = {
         "nobody moves who obeys nobody",
         _case(14.0, *(Kill(at_s=at_s, who=name) for at_s, name in ((7.5, "base"), (7.5, "robot2")))),
     ),
-    "begins_two_stages_ahead": ("nobody is two stages ahead", _case(14.0)),
+    "begins_two_stages_ahead": ("nobody is two stages ahead", _case(24.0, robots=3)),
     "goes_beyond_what_is_released": ("nobody goes beyond what is released", _case(12.0, robots=3)),
     "releases_before_all_have_accepted": (
         "nothing is released before all have accepted it",
-        _case(14.0, Loss(at_s=2.0, speakers=("base",), hearers=("robot1",), share=0.7), robots=3),
+        _case(
+            20.0,
+            *(Cut(at_s=3.0 + 1.6 * time, for_s=0.8, speakers=("base",), hearers=("robot1",)) for time in range(10)),
+            robots=3,
+        ),
     ),
     "goes_back_on_its_own": (
         "nobody goes back before all have turned",
@@ -142,7 +145,7 @@ CASES: Final[dict[str, tuple[str, ChaosCase]]] = {
     "releases_links_first": ("links are released when their replacement is confirmed", _case(4.0)),
     "trusts_its_predecessor": (
         "links are released when their replacement is confirmed",
-        _case(20.0, *(Kill(at_s=at_s, for_s=2.0, who="leader") for at_s in (6.0, 11.0)), robots=4),
+        _case(22.0, *(Kill(at_s=15.0, who=name) for name in ("base", "robot2")), robots=4),
     ),
     "takes_a_proposal_for_the_tree": ("links kept are of a tree in force", _case(4.0)),
     "counts_trees_anew": ("trees are numbered", _case(16.0, robots=3)),
@@ -151,14 +154,21 @@ CASES: Final[dict[str, tuple[str, ChaosCase]]] = {
         "nobody goes back to an earlier tree",
         _case(16.0, Pause(at_s=4.0, for_s=3.0, who="base"), Kill(at_s=9.0, who="leader"), robots=4),
     ),
-    "goes_before_the_tree_is_in_force": ("nobody goes where another tree is needed", _case(4.0, seed=0)),
+    "goes_before_the_tree_is_in_force": (
+        "nobody goes where another tree is needed",
+        _case(14.0, Delay(at_s=0.0, least_s=0.05, mean_s=0.0), Kill(at_s=8.0, who="leader"), robots=4),
+    ),
     "goes_while_another_tree_is_negotiated": (
         "nobody goes where another tree is needed",
         _case(16.0, Delay(at_s=5.0, hearers=("base",), least_s=0.05, mean_s=0.0), robots=3, seed=2),
     ),
     "keeps_proposals_open": (
         "proposals are bounded",
-        _case(10.0, Cut(at_s=5.2, speakers=("robot1",), hearers=("base",)), robots=3),
+        _case(
+            16.0,
+            *(Cut(at_s=4.0 + 1.6 * time, for_s=1.3, speakers=("robot1",), hearers=("base",)) for time in range(8)),
+            robots=3,
+        ),
     ),
     "never_stands": (
         "a team is led soon after the last fault",
