@@ -3,7 +3,8 @@
 The rules see more than any peer does: true time, all minds, all disks. They are told by what peers say and by what they
 hold to be true; none of them asks the code that they judge whether it did right. Each kind of rule is a class of its
 own: leases and obedience here, orders and motion in :mod:`launcher.order_rules`, trees in :mod:`launcher.tree_rules`,
-bodies in :mod:`launcher.body_rules`; how soon a team recovers is for :mod:`launcher.recovery_rules`.
+bodies in :mod:`launcher.body_rules`, what peers know of the agent in :mod:`launcher.set_rules`; how soon a team
+recovers is for :mod:`launcher.recovery_rules`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How far robots may be from each other is judged within one plan, whatever they have followed since."""
+"""What robots say of themselves is held against what was ordered and where they are, by hand-made plans and places."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ class Team:
         self.peers = {name: Peer(name) for name in ("base", *names)}
         self.rules = MotionRules(cast(Any, self.peers))
 
-    def hear(self, name: str, body: Deployment | State) -> None:
-        envelope = Envelope(sender=name, incarnation=1, sequence=0, sent_at_s=0.0, body=body)
+    def hear(self, name: str, body: Deployment | State, incarnation: int = 1) -> None:
+        envelope = Envelope(sender=name, incarnation=incarnation, sequence=0, sent_at_s=0.0, body=body)
         self.rules.hear(cast(Any, self.peers[name]), envelope)
 
-    def order(self, epoch: int, **starts_m: float) -> None:
-        """A plan in which every member drives a metre a stage, from where it starts; all of it is released."""
+    def order(self, epoch: int, *, released: int = STAGES - 1, **starts_m: float) -> None:
+        """A plan in which every member drives a metre a stage, from where it starts."""
         ways = tuple(
             MemberWay(
                 member=name,
@@ -59,7 +59,7 @@ class Team:
             )
             for name, start_m in starts_m.items()
         )
-        motion = Motion(plan=0, revision=0, first_stage=0, released=STAGES - 1, ways=ways, connection="none")
+        motion = Motion(plan=0, revision=0, first_stage=0, released=released, ways=ways, connection="none")
         deployment = Deployment(
             authority=Authority(epoch=epoch, leader="base", sequence=epoch),
             warrant=Warrant(lease_s=1.0, marks=()),
@@ -73,11 +73,14 @@ class Team:
         )
         self.hear("base", deployment)
 
-    def stand(self, name: str, x_m: float, epoch: int, finished: int) -> None:
+    def stand(
+        self, name: str, x_m: float, epoch: int, finished: int, *, y_m: float = 0.0, incarnation: int = 1
+    ) -> None:
         """A robot says that it stands there, so far in its plan."""
-        self.peers[name].place = (x_m, 0.0)
+        self.peers[name].place = (x_m, y_m)
         progress = Progress(epoch=epoch, plan=0, revision=0, finished=finished)
-        self.hear(name, State(position=(x_m, 0.0), velocity=(0.0, 0.0), mode="holding", progress=progress))
+        state = State(position=(x_m, y_m), velocity=(0.0, 0.0), mode="holding", progress=progress)
+        self.hear(name, state, incarnation)
 
 
 @pytest.mark.parametrize("finished", [0, 1])
@@ -105,3 +108,38 @@ def test_what_was_finished_in_one_plan_is_not_finished_in_the_next() -> None:
     team.stand("robot2", 3.0, 2, 0)
     with pytest.raises(Violation, match="robot1 is in stage 2, robot2 has finished 0"):
         team.stand("robot1", 5.5, 2, 2)
+
+
+@pytest.mark.parametrize(
+    ("rule", "x_m", "y_m", "epoch", "finished"),
+    [
+        ("motions accepted were ordered", 0.0, 0.0, 2, 0),
+        ("nobody goes back", 0.0, 0.0, 1, 0),
+        ("everybody is on their way", 1.5, 0.1, 1, 1),
+        ("everybody is on their way", 2.5, 0.0, 1, 1),
+        ("nobody goes beyond what is released", 3.5, 0.0, 1, 3),
+    ],
+)
+def test_who_is_not_where_it_may_be_is_found(rule: str, x_m: float, y_m: float, epoch: int, finished: int) -> None:
+    """After it has stood at the end of stage 0; three stages of four are released."""
+    team = Team("robot1")
+    team.order(1, released=STAGES - 2, robot1=0.0)
+    team.stand("robot1", 1.0, 1, 1)
+    with pytest.raises(Violation) as broken:
+        team.stand("robot1", x_m, epoch, finished, y_m=y_m)
+    assert broken.value.rule == rule
+
+
+def test_nobody_follows_a_motion_without_a_way_of_its_own() -> None:
+    team = Team("robot1", "robot2")
+    team.order(1, robot1=0.0)
+    with pytest.raises(Violation) as broken:
+        team.stand("robot2", 0.0, 1, 0)
+    assert broken.value.rule == "motions accepted are one's own"
+
+
+def test_another_process_may_begin_again() -> None:
+    team = Team("robot1")
+    team.order(1, robot1=0.0)
+    team.stand("robot1", 2.0, 1, 2)
+    team.stand("robot1", 0.0, 1, 0, incarnation=2)
