@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import ctypes
 import faulthandler
+import gc
 import os
 import signal
 import sys
@@ -153,6 +154,9 @@ def live(
     from protocol.link_faults import LINKS, LinkFilter, LinkTable
     from protocol.zenoh_bus import ZenohBus
 
+    # What has been imported stays. To look through it for garbage would stop everything for a fifth of a second, and
+    # copy the memory that forks share.
+    gc.freeze()
     epoch_s = time.clock_gettime(time.CLOCK_BOOTTIME) - (time.time() - mission.epoch_unix_s)
 
     def now() -> float:
