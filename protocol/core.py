@@ -36,7 +36,7 @@ class Written(msgspec.Struct, frozen=True):
 
 
 class Say(msgspec.Struct, frozen=True):
-    """Publish this to all."""
+    """Publish this: to all, or to whom it is for (:func:`protocol.messages.addressee_of`)."""
 
     body: AnyBody
 

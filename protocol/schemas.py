@@ -74,7 +74,7 @@ SPEAKERS: Final = {
     "deployment": ("the leader", "with every decision, and again while it holds"),
     "vote_request": (
         "who stands for leader, and the leader",
-        "eight times in a lease; the leader four times, as long as all answer",
+        "eight times in a lease; the leader four times if all answer, sixteen if too few do",
     ),
     "vote": ("every peer, to who asked", "for each vote request heard"),
     "topology": ("the leader", "four times a second, and with every change"),
