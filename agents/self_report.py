@@ -30,7 +30,8 @@ class SelfReport:
 
     def __init__(self, mission: Mission, role: RoleName, radius_m: float, now_s: float) -> None:
         self._role, self._radius_m = role, radius_m
-        self._control = Rhythm(1.0 / mission.control_hz, now_s)
+        self._control_s = 1.0 / mission.control_hz
+        self._control = Rhythm(self._control_s, now_s)
         self._heartbeat_s = 1.0 / mission.heartbeat_hz
         self._heartbeat = Rhythm(self._heartbeat_s, now_s)
         self._said_s = -math.inf
@@ -47,12 +48,13 @@ class SelfReport:
         Args:
             now_s: the time.
             body: what there is to say.
-            urgent: it is said, but not recorded, before its time.
+            urgent: it is said, but not recorded, before its time; if that comes soon, it is then recorded only.
             silent: it is recorded only.
         """
         effects: list[Effect] = []
         due = self._control.due(now_s)
-        if (due or urgent) and not silent:
+        stale = now_s >= self._said_s + 0.5 * self._control_s - EARLY_S
+        if (urgent or (due and stale)) and not silent:
             self._said_s = now_s
             effects.append(Publish(body))
         if due:
