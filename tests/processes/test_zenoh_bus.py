@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import signal
 import socket
 import subprocess
@@ -13,9 +14,11 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
+import zenoh
 
+from protocol import zenoh_bus
 from protocol.bus import BusEvent, PeerAppeared, PeerVanished, Received
-from protocol.messages import MAXIMUM_PAYLOAD_BYTES, decode
+from protocol.messages import MAXIMUM_PAYLOAD_BYTES, Envelope, Heartbeat, decode, encode
 from protocol.zenoh_bus import BusUnavailable, ZenohBus, free_endpoints
 
 pytestmark = pytest.mark.processes
@@ -166,8 +169,11 @@ def test_peers_hear_the_kinds_that_they_listen_to_and_what_is_for_them(stack: Ex
         assert {e.key for e in late_ear.heard if isinstance(e, Received)} == {f"{TEAM}/v1/r0/vote/r2"}
 
 
-def test_who_joins_late_is_told_what_stands_without_waiting_for_it_to_be_said_again(stack: ExitStack) -> None:
-    """Nothing is said twice here, so that without an answer nothing would be heard."""
+def test_who_joins_late_is_told_what_stands_without_waiting_for_it_to_be_said_again(
+    stack: ExitStack, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing is said again here, so that without an answer nothing would be heard."""
+    monkeypatch.setattr(zenoh_bus, "STANDS_FOR_S", 1e6)  # however slow the machine is
     endpoints = free_endpoints(2)
     bus, _ = join(stack, "r0", endpoints, 0)
     said: list[dict[str, bytes]] = []
@@ -184,6 +190,39 @@ def test_who_joins_late_is_told_what_stands_without_waiting_for_it_to_be_said_ag
     ear.wait_for(*(Received(f"{TEAM}/v1/r0/{kind}", said[1][kind]) for kind in ("deployment", "topology")))
     heard = [event for event in ear.heard if isinstance(event, Received)]
     assert len(heard) == 2, "only what it listens to, only the latest, and only what stands"
+
+
+def test_what_was_not_said_lately_does_not_stand(stack: ExitStack, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(zenoh_bus, "STANDS_FOR_S", 0.0)
+    endpoints = free_endpoints(2)
+    bus, ear = join(stack, "r0", endpoints, 0)
+    bus.publish(f"{TEAM}/v1/r0/deployment", b"old")
+    _, late_ear = join(stack, "r1", endpoints, 1)
+    ear.wait_for(PeerAppeared("r1"))
+    key = f"{TEAM}/v1/r0/ranges"
+    deadline = time.monotonic() + PATIENCE_S
+    while Received(key, b"new") not in late_ear.heard and time.monotonic() < deadline:
+        bus.publish(key, b"new")
+        time.sleep(0.05)
+    assert {event for event in late_ear.heard if isinstance(event, Received)} == {Received(key, b"new")}
+
+
+def test_other_programs_may_ask_as_the_page_on_messages_says(
+    stack: ExitStack, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(zenoh_bus, "STANDS_FOR_S", 1e6)
+    page = (Path(__file__).parents[2] / "docs/messages/README.md").read_text()
+    program = page.partition("```python\n")[2].partition("```")[0]
+    endpoints = free_endpoints(2)
+    for i in range(2):
+        bus, _ = join(stack, f"r{i}", endpoints, i)
+        body = Heartbeat(role="robot", mode="waiting")
+        envelope = Envelope(sender=f"r{i}", incarnation=0, sequence=0, sent_at_s=0.0, body=body)
+        bus.publish(f"{TEAM}/v1/r{i}/heartbeat", encode(envelope))
+    mission = {"team": TEAM, "roster": [{"endpoint": endpoint} for endpoint in endpoints]}
+    exec(program, {"json": json, "zenoh": zenoh, "mission": mission})
+    said = "{'kind': 'heartbeat', 'role': 'robot', 'mode': 'waiting'}"
+    assert sorted(capsys.readouterr().out.splitlines()) == [f"{TEAM}/v1/r{i}/heartbeat {said}" for i in range(2)]
 
 
 def test_a_late_joiner_sees_who_is_there_and_is_seen_to_leave(stack: ExitStack) -> None:
