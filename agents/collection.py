@@ -55,16 +55,19 @@ class Collection:
 
     def _follow(self, robot: str, now: State) -> None:
         """Note by which waypoints a robot has come since it was heard last."""
-        behind = self._behind.setdefault(robot, deque(maxlen=MEMORY))
+        behind = self._behind.get(robot)
+        if behind is None:
+            behind = self._behind[robot] = deque(maxlen=MEMORY)
         known = self._known.get(robot)
-        if _plan(now) is None or known is None or not isinstance(known.body, State) or _plan(known.body) != _plan(now):
+        before = known.body if known is not None else None
+        if not isinstance(before, State) or _plan(now) is None or _plan(before) != _plan(now):
             behind.clear()
         elif not _turned(now):
             if not behind:
-                behind.append(known.body.position)
-            if known.body.path[1:2] != now.path[1:2]:
+                behind.append(before.position)
+            if before.path[1:2] != now.path[1:2]:
                 ahead = set(now.path[1:])
-                behind.extend(takewhile(lambda place: place not in ahead, known.body.path[1:]))
+                behind.extend(takewhile(lambda place: place not in ahead, before.path[1:]))
 
     def body(self, peer: str) -> State | Intent | None:
         """What a peer says of itself; None if it is not there, or this process of it has said nothing yet."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from itertools import combinations
 
 from agents.records import Connectivity
@@ -32,15 +33,20 @@ def judge_network(
     Complexity: O(n² w + n³) for n members and w walls.
     """
     names, points = list(places), list(places.values())
-    visible = environment.visibility_matrix(points)
-    rows = visible.tolist()
-    component = component_labels(visible)
+    rows = environment.visibility_matrix(points).tolist()
+    component, lambda2 = _join(tuple(map(tuple, rows)))
     here, there = names.index(base), names.index(agent) if agent in places else None
     return Connectivity(
         links=tuple((points[i], points[j]) for i, j in combinations(range(len(points)), 2) if rows[i][j]),
         agent_visible=there is not None and sum(rows[there]) > 1,  # it is on the diagonal itself
         chain_connected=bool(there is not None and component[here] == component[there]),
-        team_connected=bool(complete and component.max() == 0),
-        lambda2=algebraic_connectivity(visible) if complete else 0.0,
+        team_connected=complete and max(component) == 0,
+        lambda2=lambda2 if complete else 0.0,
         tree_links=tuple((places[a], places[b]) for a, b in edges if a in places and b in places),
     )
+
+
+@lru_cache(maxsize=64)
+def _join(visible: tuple[tuple[bool, ...], ...]) -> tuple[tuple[int, ...], float]:
+    """Components and λ₂ of who sees whom: the same again and again."""
+    return tuple(component_labels(visible).tolist()), algebraic_connectivity(visible)

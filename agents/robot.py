@@ -110,8 +110,10 @@ class Robot:
         if followed is not self._followed and followed != self._followed:
             return AT_ONCE_S
         latest = self._standing.latest
-        if latest is not self._orders and (not self._obeys or _task(latest) != _task(self._orders)):
-            return AT_ONCE_S
+        if latest is not self._orders:
+            moves = self._leg is not STANDING
+            if not self._obeys or _task(latest, moves=moves) != _task(self._orders, moves=moves):
+                return AT_ONCE_S
         if not self._obeys:
             return self._wake_s
         until_s = self._allegiance.obeyed_until_s
@@ -286,12 +288,16 @@ class Robot:
         self._effects.append(Record(LogLine(level=level, text=text)))
 
 
-def _task(orders: Deployment | None) -> tuple[int, ...]:
-    """What orders tell a robot; while that is the same, their repetition only prolongs them."""
+def _task(orders: Deployment | None, *, moves: bool) -> tuple[int, ...]:
+    """What orders tell a robot at once; while that is the same, their repetition only prolongs them.
+
+    How far it may go it need not know before it comes to the end of a leg, if it moves.
+    """
     if orders is None or orders.motion is None:
         return () if orders is None else (orders.authority.epoch,)
     motion = orders.motion
-    return orders.authority.epoch, motion.plan, motion.revision, motion.released, motion.first_stage
+    task = (orders.authority.epoch, motion.plan, motion.revision)
+    return task if moves else (*task, motion.released, motion.first_stage)
 
 
 def _key(epoch: int, motion: Motion) -> tuple[int, int, int]:

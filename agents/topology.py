@@ -19,7 +19,7 @@ from agents.collection import Collection as Others
 from agents.link_sight import Scene, judge_links, stages_in_sight
 from agents.mission import Mission
 from agents.records import LogLine, TopologyChange, TreeAnswer
-from agents.role import Compute, Effect, Event, Heard, JobDone, Publish, Record
+from agents.role import Compute, Effect, Event, Heard, JobDone, Publish, Record, Woken
 from agents.standing_orders import StandingOrders
 from agents.surroundings import Body, Estimate, Surroundings
 from planning.environment import Environment
@@ -182,9 +182,9 @@ class TeamTree:
 
     def handle(self, event: Event, now_s: float) -> Iterable[Effect]:
         """Take up or leave the office, hear words and answers, judge links, and say what is due."""
-        if self._reign is None and self._allegiance.reign is None and _answers(event):
-            return ()  # most of what is heard: it is for the leader
         self._news = False
+        if self._reign is None and self._allegiance.reign is None and self._is_nothing(event, now_s):
+            return ()
         self._follow_office(now_s)
         match event:
             case Heard(_, envelope) if isinstance(envelope.body, Topology):
@@ -201,6 +201,12 @@ class TeamTree:
         self._judge(now_s)
         self._confirm(now_s)
         return self._collect()
+
+    def _is_nothing(self, event: Event, now_s: float) -> bool:
+        """Whether a peer that does not lead has nothing to do, as mostly: the answers are for the leader."""
+        if isinstance(event, Heard):
+            return isinstance(event.envelope.body, Confirmation)
+        return isinstance(event, Woken) and self.held.proposal is None and now_s < self._answer_at_s
 
     def _collect(self) -> list[Effect]:
         effects, self._effects = self._effects, []
@@ -357,8 +363,3 @@ def _describe(answer: Confirmation) -> TreeAnswer:
         confirmed=tuple(view.peer for view in answer.views if view.verdict != "refuses"),
         kept=None if answer.committed is None else answer.committed.number,
     )
-
-
-def _answers(event: Event) -> bool:
-    """Whether it is an answer to the leader."""
-    return isinstance(event, Heard) and isinstance(event.envelope.body, Confirmation)

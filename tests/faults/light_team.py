@@ -35,7 +35,7 @@ LINK_M: Final = 5.0
 """Relays are to be no farther apart than this."""
 KEPT_M: Final = 1.0
 """Places that are off by less are kept."""
-STAGES_M: Final = (0.5, 0.5, 0.15)
+STAGES_M: Final = (0.5, 0.5, 0.2)
 """Lengths of stages; short ones are released several at a time."""
 
 
