@@ -188,11 +188,10 @@ class Allegiance:
     def _note_office(self, lease_until_s: float, obeyed_until_s: float, now_s: float) -> None:
         """Record who leads and who is obeyed, if that is new. What ended while this peer hung ended in its time."""
         before = self._office
-        standing = self.election.standing.value
-        office = structs.replace(before, standing=standing, leads=self.reign, obeys=self.obeyed(now_s))
-        if office == before:
+        standing, leads, obeys = self.election.standing.value, self.reign, self.obeyed(now_s)
+        if standing == before.standing and leads == before.leads and obeys == before.obeys:
             return
-        self._office = office
+        self._office = office = structs.replace(before, standing=standing, leads=leads, obeys=obeys)
         self._effects.append(
             Record(
                 structs.replace(

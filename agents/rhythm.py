@@ -15,15 +15,13 @@ class Rhythm:
         self._period_s = period_s
         self._start_s = start_s
         self._beats = 0
-
-    @property
-    def next_s(self) -> float:
+        self.next_s = start_s
         """When it is due next."""
-        return self._start_s + self._beats * self._period_s
 
     def due(self, now_s: float) -> bool:
         """Whether it is due now; if so, its next time comes after now, and beats that were missed are skipped."""
         if now_s < self.next_s - EARLY_S:
             return False
         self._beats = max(self._beats, math.floor((now_s + EARLY_S - self._start_s) / self._period_s)) + 1
+        self.next_s = self._start_s + self._beats * self._period_s
         return True

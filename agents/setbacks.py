@@ -44,6 +44,8 @@ class Setbacks:
     @property
     def next_s(self) -> float:
         """When a tree may be tried again next."""
+        if not self._setbacks:
+            return float("inf")
         return min((setback.until_s for setback in self._setbacks.values() if not setback.over), default=float("inf"))
 
     def note(self, edges: Collection[Edge], now_s: float) -> None:
