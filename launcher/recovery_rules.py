@@ -60,12 +60,16 @@ class RecoveryRules:
         if 2 * len(voters) <= len(self._mission.voters.voters):
             self.led_after_s = self.planned_after_s = math.inf  # no majority is left
             return
-        lost = [peer.name for peer in voters if not self._is_led(peer)]
+        lost = self._lost()
         if not lost:
             self.led_after_s = after_s
         elif after_s > self._led_within_s:
             text = f"{after_s:.1f} s after the last fault {', '.join(lost)} obey nobody who leads"
             raise Violation("a team is led soon after the last fault", text)
+
+    def _lost(self) -> list[str]:
+        """Who is there and not led."""
+        return [peer.name for peer in self._voters() if not self._is_led(peer)]
 
     def _is_led(self, peer: SimulatedPeer) -> bool:
         """Whether a peer obeys somebody who leads: it may obey who has died for some moments more."""
@@ -76,6 +80,9 @@ class RecoveryRules:
         return leader.allegiance is not None and leader.allegiance.reign == reign and holds_lease(leader)
 
     def _look_whether_planned(self, after_s: float) -> None:
+        if after_s <= self._led_within_s and self._lost():
+            self.led_after_s = math.nan  # a lease that the faults have left without enough votes has ended
+            return
         idle = [peer.name for peer in self._voters() if not self._has_plan(peer)]
         if not idle:
             self.planned_after_s = after_s
