@@ -192,7 +192,7 @@ class MotionRules:
             accepted = None
             if last is not None and (last.epoch, last.plan) == (epoch, motion.plan):
                 accepted = self._motions.get((epoch, last.plan, last.revision))
-            if accepted is None or not _agree(accepted, motion):
+            if accepted is None or not agree(accepted, motion):
                 text = f"stage {motion.released} of revision {motion.revision}, and {way.member} has not accepted it"
                 raise Violation("nothing is released before all have accepted it", text)
 
@@ -249,7 +249,7 @@ class MotionRules:
                 raise Violation("nobody is two stages ahead", text)
 
 
-def _agree(one: Motion, other: Motion) -> bool:
+def agree(one: Motion, other: Motion) -> bool:
     """Whether two revisions have the same stages, as far as the second is released and the first reaches back."""
     if one.revision == other.revision:
         return True

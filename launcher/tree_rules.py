@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from agents.topology import TeamTree
+from launcher.order_rules import agree
 from launcher.simulated_peer import SimulatedPeer
 from launcher.violation import Violation
 from protocol.membership import Presence
@@ -63,6 +64,8 @@ class TreeRules:
         """By peer: its incarnation, and the tree whose links it keeps."""
         self._released: dict[tuple[int, int], int] = {}
         """By epoch and plan: the last stage that anybody may begin."""
+        self._ordered: dict[tuple[int, int, int], Motion] = {}
+        """By epoch, plan and revision: the motion as it was ordered first."""
 
     def hear(self, peer: SimulatedPeer, envelope: Envelope) -> None:
         """Judge the words of leaders by the answers of the others."""
@@ -142,6 +145,9 @@ class TreeRules:
     def _judge_release(self, orders: Deployment, motion: Motion) -> None:
         """Robots are let go on only by orders whose tree is in force, and not to one that is being negotiated."""
         epoch, key = orders.authority.epoch, (orders.authority.epoch, motion.plan)
+        is_first = (*key, motion.revision) not in self._ordered
+        self._ordered.setdefault((*key, motion.revision), motion)
+        _forget(self._ordered)
         if motion.released <= self._released.get(key, motion.first_stage - 1):
             return
         self._released[key] = motion.released
@@ -150,9 +156,20 @@ class TreeRules:
         stage = f"stage {motion.released} of plan {motion.plan} is released"
         if latest is None or _links(latest.edges) != _links(orders.edges):
             raise Violation("nobody goes where another tree is needed", f"{stage}, and {orders.edges} are not in force")
-        if (motion.plan, motion.revision) in self._open.get(epoch, ()):
+        # What the revision before has too was released on the way to the tree in force, and is only said now.
+        is_new = not is_first or not self._is_of_the_revision_before(epoch, motion)
+        if is_new and (motion.plan, motion.revision) in self._open.get(epoch, ()):
             text = f"{stage}, and the tree that revision {motion.revision} leads to is being negotiated"
             raise Violation("nobody goes where another tree is needed", text)
+
+    def _is_of_the_revision_before(self, epoch: int, motion: Motion) -> bool:
+        """Whether all that is released of a motion is in the one that it revises, too."""
+        known = [
+            other
+            for (other_epoch, plan, revision), other in self._ordered.items()
+            if (other_epoch, plan) == (epoch, motion.plan) and revision < motion.revision
+        ]
+        return bool(known) and agree(known[-1], motion)
 
 
 def _forget(memory: dict[Any, Any]) -> None:

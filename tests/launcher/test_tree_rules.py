@@ -245,3 +245,13 @@ def test_nothing_more_is_released_of_a_motion_while_the_tree_that_it_leads_to_is
         play.release(2, CHAIN, revision=1)
     play.word(tree(0))  # the proposal has been given up
     play.release(3, CHAIN, revision=1)
+
+
+def test_what_two_revisions_have_in_common_may_be_released_with_the_second() -> None:
+    play = Play()
+    play.put_in_force(tree(0), CHAIN)
+    play.release(0, CHAIN, revision=0)
+    play.word(tree(0), propose(tree(1, STAR), [STAR[1]], revision=1))
+    play.release(1, CHAIN, revision=1)
+    with pytest.raises(Violation, match="revision 1 leads to is being negotiated"):
+        play.release(2, CHAIN, revision=1)
