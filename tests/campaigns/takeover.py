@@ -154,9 +154,11 @@ def lose_robots(outcome: Outcome, run_team: Callable[[Sequence[Fault], float], R
     done = run_team(_spread([Kill(at_s=0.0, for_s=2.0, who=robot) for robot in robots], 11.0), BEGIN_S + 11.0 * trials)
     outcome.missed += done.reigns.broken
     for at_s, mishap in done.reigns.mishaps:
-        if mishap.kind == "kill" and mishap.text.startswith("nothing done"):
+        if mishap.kind != "kill" or mishap.over:
+            continue
+        if mishap.text.startswith("nothing done"):
             outcome.void += 1
-        elif mishap.kind == "kill":
+        else:
             re_formed_s = find_motion_without(done.records, mishap.who[0], at_s)
             if re_formed_s is None:
                 outcome.missed.append(f"{mishap.text} at {at_s:.2f} s, and no motion without it")
