@@ -84,6 +84,9 @@ class Dispatcher:
         self._states: dict[str, State] = {}
         self.reports: list[str] = []
         """Why plans have ended; whoever reads it empties it."""
+        self.forgotten = False
+        """Whether a plan has ended since a robot knows nothing of it any more: the next need not wait until it is due,
+        as it must where a plan is refused, and the next may be, too. Whoever reads it resets it."""
         self.news = False
         """Whether there is more to order than was ordered last."""
         self._due = False
@@ -219,6 +222,7 @@ class Dispatcher:
         ours = (self._epoch, self._plan)
         if _plan(before) == ours and (_plan(state) != ours or _turned(state)):
             self._begin_afresh(f"{robot} does not follow plan {self._plan} any more")
+            self.forgotten = True
         elif self._ordered is None or robot not in authority.undecided:
             return
         elif state.refusing and has_heard(state, self._ordered):

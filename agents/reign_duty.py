@@ -155,6 +155,8 @@ class ReignDuty:
         for text in self._dispatcher.reports:
             self._log("warning", text)
         self._dispatcher.reports.clear()
+        self._urgent = self._urgent or self._dispatcher.forgotten
+        self._dispatcher.forgotten = False
         if not self._planning:  # what is planned begins where the robots may go now
             self._dispatcher.release()
         if self._dispatcher.news:
