@@ -129,7 +129,8 @@ class Robot:
                 progress = envelope.body.progress
                 if self._follower.retreat is not None:
                     self._follower.retreat.hear(envelope.sender, progress, now_s)
-                if progress is not None and self._follower.hear(envelope.sender, progress) and self._mode == "yielding":
+                news = progress is not None and self._follower.hear(envelope.sender, progress)
+                if news and self._mode == "yielding" and self._follower.may_go_on:
                     self._wake_s = now_s
             case JobDone(job=name) if name == CERTIFICATE:
                 self._take_verdict(event)

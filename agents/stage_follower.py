@@ -182,6 +182,11 @@ class StageFollower:
             self._heard[member] = progress
         return news
 
+    @property
+    def may_go_on(self) -> bool:
+        """Whether nobody keeps it from its next stage. O(k) for k members."""
+        return self._motion is not None and self.retreat is None and self._may_begin(self._finished)
+
     def steer(self, position: Point) -> Leg:
         """The leg to drive from here, which does not go beyond the stage that may be under way. O(k) a stage."""
         if self.retreat is not None:

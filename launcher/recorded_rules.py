@@ -220,12 +220,16 @@ class RecordedRules:
 
 
 def _overlaps(spells: Sequence[Spell]) -> Iterator[tuple[Spell, Spell]]:
-    """Pairs of spells of different reigns at one time. O(n²) in the worst case."""
+    """Pairs of spells of different leaders at one time. O(n²) in the worst case.
+
+    A leader may move to a higher epoch within its lease; who has not heard of that yet obeys the same process.
+    """
     for place, spell in enumerate(spells):
         for other in spells[place + 1 :]:
             if other.from_s >= spell.until_s - SLACK_S:
                 break
-            if other.reign != spell.reign and other.until_s - other.from_s > SLACK_S:
+            same = (other.leader, other.incarnation) == (spell.leader, spell.incarnation)
+            if not same and other.until_s - other.from_s > SLACK_S:
                 yield spell, other
 
 

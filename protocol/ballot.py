@@ -61,6 +61,11 @@ class Ballot:
         """When the last round was asked; minus infinity before there is one."""
         return next(reversed(self._asked_s.values()), -math.inf)
 
+    @property
+    def asked_since_s(self) -> float:
+        """When the first round was asked of those that votes can still make count; infinity before there is one."""
+        return next(iter(self._asked_s.values()), math.inf)
+
     def is_answered(self, now_s: float) -> bool:
         """Whether the last round has been answered by all who have voted within the lease."""
         asked_s = self.asked_last_s

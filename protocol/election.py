@@ -39,6 +39,9 @@ ROUND_S: Final = LEASE_S / 8
 CALM_ROUND_S: Final = LEASE_S / 4
 """A leader whose last round all have answered who vote for it loses nothing now, and asks again after this only."""
 
+CALM_AFTER_S: Final = LEASE_S / 2
+"""Not before it has asked for so long: the first rounds tell the team that it leads, which is to go fast."""
+
 URGENT_ROUND_S: Final = LEASE_S / 16
 """A leader asks so often when half of its lease has gone by without enough answers."""
 
@@ -216,7 +219,8 @@ class Election:
         assert ballot is not None
         if ballot.reign == self.office:
             self.lease_until_s = max(self.lease_until_s, ballot.held_until_s)
-            if ballot.is_answered(now_s):
+            settled = ballot.asked_last_s - ballot.asked_since_s >= CALM_AFTER_S
+            if settled and ballot.is_answered(now_s):
                 self._next_round_s = ballot.asked_last_s + CALM_ROUND_S
         elif ballot.wants_only(self._name, now_s):
             if self._voter.renew(ballot.reign, now_s):

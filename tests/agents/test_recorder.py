@@ -261,7 +261,9 @@ def test_a_motion_is_drawn_with_its_stages_and_how_far_everybody_is(tmp_path: Pa
         plan=0, revision=3, first_stage=5, released=-1, ways=ways, connection="joined", joined=("base", "robot_1")
     )
     recorder.record(1.0, "base", Ordered(epoch=0, motion=motion))
-    recorder.record(1.1, "base", Advance(epoch=1, plan=0, revision=0, released=6, finished={"robot_1": 5, "robot_2": 6}))
+    recorder.record(
+        1.1, "base", Advance(epoch=1, plan=0, revision=0, released=6, finished={"robot_1": 5, "robot_2": 6})
+    )
     recorder.record(
         2.0, "base", Ordered(epoch=0, motion=structs.replace(motion, connection="team", ways=(*ways, agent)))
     )

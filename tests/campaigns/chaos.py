@@ -11,6 +11,7 @@ rule, with the last lines of its history: ``--case`` runs that one again.
 from __future__ import annotations
 
 import argparse
+import gc
 import math
 import sys
 import time
@@ -28,6 +29,9 @@ from tests.faults.real_team import draw_real_case
 from tests.faults.shrinking import shrink
 
 FOLDER: Final = Path("runs/chaos")
+
+COLLECTED_AFTER: Final = (50_000, 20, 100)
+"""Thresholds of the garbage collector: a mission makes little garbage in cycles, and to look for it takes an eighth."""
 
 DRAW: Final = {"light": draw_case, "real": draw_real_case}
 
@@ -66,7 +70,8 @@ def run_all(work: Sequence[tuple[str, int]], processes: int) -> list[Result]:
     """Run missions in several processes; say now and then how far it is."""
     results: list[Result] = []
     shown_s = time.monotonic()
-    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+    context = get_context("spawn")
+    with ProcessPoolExecutor(processes, context, initializer=gc.set_threshold, initargs=COLLECTED_AFTER) as pool:
         for result in pool.map(run_one, work, chunksize=4):
             results.append(result)
             if result.broken:

@@ -11,8 +11,10 @@ from msgspec import structs
 
 from agents.records import Advance, AnyRecord, LogLine, Office, Taken, TopologyChange, TreeAnswer
 from launcher.fault_timetable import LEADER, Kill, Timetable
+from launcher.recorded_rules import RecordedRules
 from launcher.reigns import find_reigns
 from launcher.simulation import simulate
+from launcher.spells import Spell
 from tests.launcher.test_simulation import CORNER, around_the_corner
 
 Entry = tuple[float, str, AnyRecord]
@@ -203,3 +205,14 @@ def test_what_a_killed_process_has_not_written_is_not_missed(honest: Records) ->
 def test_how_old_orders_were_is_not_judged_where_nobody_knows_when_the_mission_began(honest: Records) -> None:
     assert find_reigns(took_late(honest)).broken == ()
     assert broken([(1.0, "base", LogLine(level="info", text="alone"))]) == ()
+
+
+@pytest.mark.parametrize(
+    ("leader", "incarnation", "fault"), [("base", 0, False), ("base", 1, True), ("robot3", 0, True)]
+)
+def test_a_leader_may_move_to_a_higher_epoch_while_some_obey_it_in_the_one_before(
+    leader: str, incarnation: int, fault: bool
+) -> None:
+    before = Spell(peer="robot1", leader="base", incarnation=0, epoch=1, from_s=0.0, until_s=2.0)
+    after = Spell(peer="robot2", leader=leader, incarnation=incarnation, epoch=2, from_s=1.5, until_s=3.0)
+    assert bool(list(RecordedRules([], [before, after], []).broken(None))) is fault
