@@ -51,7 +51,10 @@ FORESEEING: Final = "foreseeing links"
 """Names of the jobs: as an end of links, and as the leader that proposes them."""
 
 ANSWER_S: Final = 1.0
-"""The standing answer is said again after this."""
+"""The standing answer is said again after this …"""
+
+ANSWER_EARLY_S: Final = 0.1
+"""… or so much earlier, if the peer is awake anyway: then it need not be woken for that."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,7 +209,7 @@ class TeamTree:
         """Whether a peer that does not lead has nothing to do, as mostly: the answers are for the leader."""
         if isinstance(event, Heard):
             return isinstance(event.envelope.body, Confirmation)
-        return isinstance(event, Woken) and self.held.proposal is None and now_s < self._answer_at_s
+        return isinstance(event, Woken) and self.held.proposal is None and now_s < self._answer_at_s - ANSWER_EARLY_S
 
     def _collect(self) -> list[Effect]:
         effects, self._effects = self._effects, []
@@ -337,7 +340,7 @@ class TeamTree:
     def _confirm(self, now_s: float) -> None:
         """Say the standing answer if it is another one, or due; the leader takes its own as any other."""
         answer = self.held.confirmation
-        if now_s < self._answer_at_s and (answer is self._answer or answer == self._answer):
+        if now_s < self._answer_at_s - ANSWER_EARLY_S and (answer is self._answer or answer == self._answer):
             return
         if answer != self._answer:
             self._effects.append(Record(_describe(answer)))

@@ -47,11 +47,11 @@ BLACKOUTS: Final = 0.04
 """Share of the occasions on which all voters, or most of them, are killed at about the same time."""
 
 
-SIZES: Final = (48, 24, 13, 9, 6)
+SIZES: Final = (56, 22, 11, 6, 5)
 """How often teams have the least number of robots, one more, and so on: what breaks a rule breaks it in small teams
 too, mostly, and of these many can be looked at."""
 
-MORE_S: Final = 6.0
+MORE_S: Final = 4.0
 """By so much missions are longer, on average, than the shortest."""
 
 PLANNING_PERIODS_S: Final = (0.5, 1.0, 2.0)
