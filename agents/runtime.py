@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from agents.casting import Casting
     from agents.leader import DeploymentPlanner
     from agents.mission import Mission
-    from agents.recorder import RerunRecorder
+    from agents.recorder import Recorder
     from agents.records import AnyRecord
     from agents.role import Compute, JobDone, Written
     from planning.environment import Environment
@@ -170,7 +170,7 @@ def live(
     promise = voter_file.read(team=mission.team, incarnation=incarnation) if name in mission.voters.voters else None
     role, driver = casting.cast(name, incarnation=incarnation, promise=promise, now_s=now())
     file = folder / "recordings" / f"{name}.{incarnation}.rrd"
-    recorder = _open_recorder(file, mission, name, incarnation, environment, casting)
+    recorder = open_recorder(file, mission, name, incarnation, environment, casting)
 
     def record(time_s: float, what: AnyRecord) -> None:
         recorder.record(time_s, name, what)
@@ -242,25 +242,30 @@ def _read_mission(file: Path, name: str, position: str | None) -> Mission:
     return structs.replace(mission, roster=tuple(moved if entry.name == name else entry for entry in mission.roster))
 
 
-def _open_recorder(
+def open_recorder(
     file: Path, mission: Mission, name: str, incarnation: int, environment: Environment, casting: Casting
-) -> RerunRecorder:
+) -> Recorder:
     """The recorder of a peer; that of the base station draws the map and says how the recording opens.
 
-    It does so beside the control loop, which takes a third of a second, and not again when it is started again.
+    It does so beside the control loop, which takes a third of a second, and not again when it is started again. Where
+    nothing can be written the peer does its work unrecorded: the team needs it.
 
     Raises:
         AlreadyRun: a process of this incarnation has recorded.
     """
-    from agents.recorder import RerunRecorder
+    from agents.recorder import NullRecorder, RerunRecorder
 
     if file.exists():
         raise AlreadyRun(
             f"{file} exists, so that an earlier process was this incarnation of {name}, and what it promised and said "
             f"would be mistaken for this one's; start {name} with an --incarnation of its own, greater than all before"
         )
-    recorder = RerunRecorder(file, team=mission.team, recording_id=file.parent.parent.name, peer=name)
-    recorder.know(mission)
+    try:
+        recorder = RerunRecorder(file, team=mission.team, recording_id=file.parent.parent.name, peer=name)
+        recorder.know(mission)
+    except (OSError, RuntimeError) as problem:  # rerun raises the latter when the disk is full
+        print(f"{name} goes on without a recording, {file} cannot be written: {problem}", file=sys.stderr, flush=True)
+        return NullRecorder()
 
     def draw() -> None:
         graph = casting.planner().graph
