@@ -1,7 +1,8 @@
 """The messages as a reader of any language wants them: ``python -m protocol.schemas docs/messages``.
 
 Writes a JSON Schema of the envelope and of each body, and a page with keys, fields and a checked example of each. All
-of it comes from :mod:`protocol.messages`, the text included; a test keeps the committed files equal to what is made.
+of it comes from :mod:`protocol.messages` and the files that it joins, the text included; a test keeps the committed
+files equal to what is made.
 """
 
 from __future__ import annotations
@@ -18,24 +19,21 @@ from typing import Any, Final
 
 import msgspec
 
-from protocol import keys, messages
+from protocol import keys, messages, wire_types
+from protocol.examples import EXAMPLES
 from protocol.messages import (
     BODIES,
     PERIODIC_KINDS,
     Aim,
-    AnyBody,
     Auction,
     Authority,
-    Bid,
     Body,
-    Confirmation,
     ConvexPiece,
     Deployment,
     Envelope,
     Goal,
     GoalReply,
     HeardRanges,
-    Heartbeat,
     Intent,
     LastHeard,
     LinkView,
@@ -46,19 +44,13 @@ from protocol.messages import (
     Offer,
     Placement,
     Progress,
-    RangeBase,
-    RangeDigest,
     RangeReply,
-    RangeRequest,
-    Ranges,
     Reign,
     Ring,
     SharedRange,
-    State,
     Topology,
     Tree,
     TreeProposal,
-    Vote,
     VoteRequest,
     Warrant,
 )
@@ -92,180 +84,10 @@ SPEAKERS: Final = {
 }
 """Kind → who says it, how often."""
 
-EXAMPLES: Final[tuple[AnyBody, ...]] = (
-    Heartbeat(role="robot", mode="moving"),
-    State(
-        position=(4.0, 2.5),
-        velocity=(0.6, 0.0),
-        mode="moving",
-        target=(7.0, 3.0),
-        path=((4.0, 2.5), (6.5, 2.5), (7.0, 3.0)),
-        obeying=Authority(epoch=1, leader="base", sequence=42),
-        progress=Progress(epoch=1, plan=3, revision=1, finished=5),
-    ),
-    Intent(
-        position=(9.0, 3.5),
-        velocity=(0.0, 0.8),
-        mode="moving",
-        goal=(9.0, 8.0),
-        path=((9.0, 3.5), (9.0, 8.0)),
-    ),
-    Goal(goal=(12.5, 4.0), correlation="5f2c9a"),
-    GoalReply(correlation="5f2c9a", accepted=True),
-    Deployment(
-        authority=Authority(epoch=1, leader="base", sequence=42),
-        warrant=Warrant(
-            lease_s=0.71, marks=(LastHeard(peer="base", mark="0.9"), LastHeard(peer="robot1", mark="0.7", age_s=0.19))
-        ),
-        decision=7,
-        placements=(
-            Placement(robot="robot1", position=(7.0, 3.0), cell=118),
-            Placement(robot="robot2", position=(9.0, 2.5), spare=True),
-        ),
-        edges=(("base", "robot1"), ("robot1", "agent")),
-        cost=1.8,
-        total_cost_m=11.4,
-        lower_bound_m=11.4,
-        relays_needed=1,
-        reason="the agent was about to leave the sight of the base",
-        motion=Motion(
-            plan=3,
-            revision=1,
-            first_stage=5,
-            released=5,
-            ways=(
-                MemberWay(member="base", radius_m=0.25, speed_m_s=0.0, waypoints=((1.0, 1.0),), stages=(0, 0, 0)),
-                MemberWay(
-                    member="robot1",
-                    radius_m=0.25,
-                    speed_m_s=0.6,
-                    waypoints=((4.0, 2.5), (6.5, 2.5), (7.0, 3.0)),
-                    stages=(0, 2, 2),
-                ),
-                MemberWay(
-                    member="robot2", radius_m=0.25, speed_m_s=0.6, waypoints=((9.0, 4.0), (9.0, 2.5)), stages=(0, 0, 1)
-                ),
-            ),
-            connection="joined",
-            joined=("base", "robot1"),
-        ),
-    ),
-    VoteRequest(
-        epoch=3,
-        correlation="0.57",
-        warrant=Warrant(
-            lease_s=0.65,
-            marks=(LastHeard(peer="base", mark="0.56", age_s=0.247), LastHeard(peer="robot1", mark="1.203")),
-        ),
-    ),
-    Vote(
-        candidate="robot2",
-        correlation="0.57",
-        granted=True,
-        promise=Reign(epoch=3, leader="robot2", incarnation=0),
-        mark="1.204",
-    ),
-    Topology(
-        authority=Authority(epoch=3, leader="robot2", sequence=17),
-        warrant=Warrant(lease_s=0.84, marks=(LastHeard(peer="base", mark="0.56"),)),
-        committed=Tree(
-            number=(3, 1),
-            members=("base", "robot1", "agent"),
-            edges=(("base", "robot1"), ("robot1", "agent")),
-            reason="1 relay needed for the agent at (9, 3.5) m",
-        ),
-        proposal=TreeProposal(
-            tree=Tree(
-                number=(3, 2),
-                members=("base", "robot1", "robot2", "agent"),
-                edges=(("base", "robot1"), ("robot1", "robot2"), ("robot2", "agent")),
-                reason="2 relays for the agent 4 m on from (9, 3.5) m",
-            ),
-            links=(
-                NewLink(ends=("robot1", "robot2"), since=Milestone(epoch=3, plan=1, revision=4, stage=12)),
-                NewLink(ends=("robot2", "agent"), since=Milestone(epoch=3, plan=1, revision=4, stage=14)),
-            ),
-            released=(("robot1", "agent"),),
-            method="optimum",
-            round=1,
-        ),
-    ),
-    Confirmation(
-        proposal=(3, 2),
-        views=(LinkView(peer="robot2", verdict="will"),),
-        committed=Tree(
-            number=(3, 1),
-            members=("base", "robot1", "agent"),
-            edges=(("base", "robot1"), ("robot1", "agent")),
-            reason="1 relay needed for the agent at (9, 3.5) m",
-        ),
-    ),
-    Auction(
-        authority=Authority(epoch=3, leader="robot2", sequence=18),
-        warrant=Warrant(lease_s=0.84, marks=(LastHeard(peer="base", mark="0.56"),)),
-        auction=5,
-        center=(9.0, 3.5),
-        aims=(Aim(places=((9.0, 3.5), (9.0, 7.5)), shares=(0.0, 1.0), ahead_m=4.0),),
-        robots=(
-            Placement(robot="robot1", position=(7.0, 3.0)),
-            Placement(robot="robot2", position=(9.0, 2.5)),
-        ),
-        standing=("robot1",),
-    ),
-    Bid(
-        epoch=3,
-        auction=5,
-        offers=(
-            Offer(
-                aim=0,
-                whole=True,
-                total_cost_m=14.2,
-                cost=2.1,
-                relays=(
-                    Placement(robot="robot1", position=(7.0, 3.0), cell=118),
-                    Placement(robot="robot2", position=(9.0, 5.0), cell=121),
-                ),
-                removed=("robot1", "agent"),
-                added=("robot1", "robot2"),
-            ),
-        ),
-    ),
-    RangeRequest(position=(4.0, 2.5), correlation="17.204"),
-    RangeReply(asker="robot1", correlation="17.204", range_m=5.13, bound_m=0.2),
-    Ranges(
-        ranges=(
-            SharedRange(
-                owner="robot1", start=0, number=204, time_s=51.25, anchor=(4.0, 2.5), range_m=5.13, bound_m=0.204
-            ),
-        )
-    ),
-    RangeDigest(
-        clock_s=51.5,
-        heard=(
-            HeardRanges(owner="base", start=0, below=207),
-            HeardRanges(owner="robot1", start=0, below=203, beyond=(204,)),
-        ),
-    ),
-    RangeBase(
-        time_s=48.75,
-        owner="robot1",
-        start=0,
-        number=194,
-        heard=(HeardRanges(owner="base", start=0, below=196), HeardRanges(owner="robot1", start=0, below=195)),
-        fingerprint=3141592653,
-        origin=(1.5, 1.0),
-        pieces=(ConvexPiece(corners=((7.1, 2.2), (7.4, 2.1), (7.5, 2.9)), checked_m=0.31),),
-        rings=(Ring(center=(2.5, 1.5), inner_m=4.93, outer_m=5.33),),
-        rejections=0,
-        anchor=(4.0, 2.5),
-        slack_m=0.24,
-    ),
-)
-
 PAGE: Final = """\
 # What the peers say
 
-Made by `make docs` from `protocol/messages.py`: change it there.
+Made by `make docs` from `protocol/messages.py` and the files that it joins: change it there.
 
 Every peer is a zenoh peer and publishes JSON (encoding `application/json`) under keys of its own. Nothing but zenoh and
 a JSON reader is needed to listen in or to send a goal; [an example](../../examples/README.md) does both. Peers do not
@@ -453,10 +275,10 @@ def _fields(struct: type[msgspec.Struct]) -> Iterator[tuple[str, str, str]]:
 
 def _aliases() -> Iterator[tuple[str, str]]:
     """Name and meaning of each type that fields refer to."""
-    statements = ast.parse(inspect.getsource(messages)).body
+    statements = ast.parse(inspect.getsource(wire_types)).body
     for statement, after in itertools.pairwise(statements):
         match statement:
-            case ast.AnnAssign(target=ast.Name(id=name), annotation=ast.Name(id="TypeAlias")) if name != "AnyBody":
+            case ast.AnnAssign(target=ast.Name(id=name), annotation=ast.Name(id="TypeAlias")):
                 yield name, _docstring(after)
 
 

@@ -18,6 +18,7 @@ from msgspec import inspect as types
 from msgspec import structs
 
 from protocol.bus import BusEvent, PeerAppeared, PeerVanished, Received
+from protocol.examples import EXAMPLES
 from protocol.keys import ADDRESSED_KINDS, Address
 from protocol.messages import (
     BODIES,
@@ -37,7 +38,6 @@ from protocol.messages import (
     encode,
     kind_of,
 )
-from protocol.schemas import EXAMPLES
 
 ODD: Final[tuple[Any, ...]] = (
     None, True, False, 0, -1, 1, 2**53, 2**63, -(2**63), 10**40, 0.0, -0.0, 1e-300, 1e300, -1e7, 1.5, "", "\x00", "NaN",

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from protocol import keys
+from protocol.examples import EXAMPLES
 from protocol.keys import Address
 from protocol.messages import BODIES, PERIODIC_KINDS, Name, addressee_of, kind_of
-from protocol.schemas import EXAMPLES
 
 names = st.builds(str.__add__, st.sampled_from("aoz"), st.text("az09_", max_size=31))
 addresses = st.builds(
