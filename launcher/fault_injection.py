@@ -29,7 +29,8 @@ from launcher.fault_timetable import (
     Timetable,
     describe,
 )
-from launcher.simulated_peer import WRITING_S, SimulatedPeer
+from launcher.simulated_hardware import WRITING_S
+from launcher.simulated_peer import SimulatedPeer
 from protocol.simulated_bus import SimulatedNetwork, VirtualTime
 from protocol.simulated_links import Delays, LinkFaults
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from agents.mission import Mission
 from launcher.fault_timetable import Clock, Disk, Fault, Kill, Pause, Timetable
-from launcher.simulated_peer import SimulatedClock, SimulatedDisk
+from launcher.simulated_hardware import SimulatedClock, SimulatedDisk
 from launcher.simulation import SimulatedTeam
 from protocol.core import Persist, Written
 from protocol.simulated_bus import VirtualTime
