@@ -12,6 +12,7 @@ from launcher.simulation import SimulatedTeam
 from launcher.violation import Violation
 from protocol.ballot import CLOCK_DRIFT
 from protocol.election import LEASE_S, REST_AFTER_FAILURE_S
+from protocol.membership import SILENT_AFTER, Presence
 
 LOOK_S: Final = 0.05
 
@@ -41,6 +42,10 @@ class RecoveryRules:
         self._mission, self._team = mission, team
         self._begins_s = 1.0 / mission.control_hz
         """By then all processes have begun."""
+        self._known_after_s = 0.0
+        """As long after that fault a leader has counted on a robot that had died; no longer than it takes to notice."""
+        self._noticed_within_s = SILENT_AFTER / mission.heartbeat_hz / (1.0 - CLOCK_DRIFT)
+        self._planning_s = JOBS * mission.planning_delay_s
         self._led_within_s = LED_S + (REST_AFTER_FAILURE_S / (1.0 - CLOCK_DRIFT) if full_disks else 0.0)
         team.time.call_at(LOOK_S, self._look)
 
@@ -86,9 +91,17 @@ class RecoveryRules:
         idle = [peer.name for peer in self._voters() if not self._has_plan(peer)]
         if not idle:
             self.planned_after_s = after_s
-        elif after_s > self.led_after_s + PLANNED_S + JOBS * self._mission.planning_delay_s:
-            text = f"{after_s - self.led_after_s:.1f} s after all obey a leader {', '.join(idle)} have no plan"
+        elif after_s <= self._noticed_within_s and self._counts_on_the_dead():
+            self._known_after_s = after_s
+        elif after_s > (known_s := max(self.led_after_s, self._known_after_s)) + PLANNED_S + self._planning_s:
+            text = f"{after_s - known_s:.1f} s after all obey a leader {', '.join(idle)} have no plan"
             raise Violation("a team that is led has a plan soon", text)
+
+    def _counts_on_the_dead(self) -> bool:
+        """Whether who leads has yet to notice that somebody has died, and waits for an answer."""
+        leader = next((peer.allegiance for peer in self._voters() if holds_lease(peer)), None)
+        dead = [peer.name for peer in self._team.peers.values() if peer.shell is None]
+        return leader is not None and any(leader.presence(name) is Presence.PRESENT for name in dead)
 
     def _has_plan(self, peer: SimulatedPeer) -> bool:
         """Whether orders are in force at a peer that come from a plan of who leads now."""

@@ -31,3 +31,11 @@ def test_without_a_majority_nobody_is_waited_for() -> None:
     verdict = run_chaos(ChaosCase(seed=1, robots=2, duration_s=10.0, faults=faults), keep=False)
     assert verdict.broken is None
     assert verdict.led_after_s == verdict.planned_after_s == float("inf")
+
+
+def test_a_new_leader_may_wait_for_whom_it_cannot_know_to_be_dead() -> None:
+    """Its token is seen to be gone 1.5 s after its death, and it counts as gone 1.5 s after that."""
+    faults = (Kill(at_s=5.0, who="robot1", noticed_after_s=1.5), Kill(at_s=5.02, who="base"))
+    verdict = run_chaos(ChaosCase(seed=1, robots=4, duration_s=13.0, faults=faults), keep=False)
+    assert verdict.broken is None
+    assert verdict.led_after_s + 1.5 < verdict.planned_after_s < 4.0
