@@ -222,8 +222,8 @@ class ZenohBus:
         )
 
     def _answer_all(self, queries: Any) -> None:
-        with suppress(zenoh.ZError):  # it is not declared any more
-            for query in queries:
+        for query in queries:  # until it is declared no more
+            with suppress(zenoh.ZError):  # costs this answer and not those to others
                 self._answer(query)
 
     def _answer(self, query: Any) -> None:
