@@ -10,6 +10,7 @@ is missed only if its recording goes on after that.
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
@@ -62,11 +63,11 @@ class RecordedRules:
                     self._restarts_s[peer].append(time_s)
                 incarnations[peer] = record.incarnation
         self._voters = incarnations.keys()
-        self._in_force: dict[Number, tuple[float, str, TopologyChange]] = {}
-        """When and by whom each tree was put in force first."""
-        for time_s, peer, change in self._all(TopologyChange):
+        self._in_force_s: dict[Number, float] = {}
+        """When each tree was put in force first."""
+        for time_s, _, change in self._all(TopologyChange):
             if change.committed:
-                self._in_force.setdefault(change.number, (time_s, peer, change))
+                self._in_force_s.setdefault(change.number, time_s)
 
     def broken(self, epoch_unix_s: float | None) -> Iterator[str]:
         """Rules that did not hold, as sentences; see :func:`launcher.reigns.find_reigns`."""
@@ -143,9 +144,9 @@ class RecordedRules:
         """Trees join whom they name, are numbered in order, and confirmed by both ends of each new link, in time."""
         confirmed: dict[tuple[str, Number], dict[str, float]] = defaultdict(dict)
         for time_s, peer, answer in self._all(TreeAnswer):
-            for other in answer.confirmed if answer.proposal is not None else ():
-                assert answer.proposal is not None
-                confirmed[peer, answer.proposal].setdefault(other, time_s)
+            if answer.proposal is not None:
+                for other in answer.confirmed:
+                    confirmed[peer, answer.proposal].setdefault(other, time_s)
         latest: dict[int, int] = {}
         for time_s, _, change in self._all(TopologyChange):
             epoch, number = change.number
@@ -162,7 +163,7 @@ class RecordedRules:
             for end, other in (ends for link in change.new for ends in (link, link[::-1])):
                 if end not in self._voters or end in change.absent or not self._goes_on(end, time_s):
                     continue
-                if confirmed[end, change.number].get(other, time_s + SILENT_S) > time_s + SLACK_S:
+                if confirmed[end, change.number].get(other, math.inf) > time_s + SLACK_S:
                     yield f"{what} was in force before {end} had confirmed its link with {other}"
 
     def _links_kept(self) -> Iterator[str]:
@@ -178,7 +179,7 @@ class RecordedRules:
             if number == kept.get(peer):
                 continue
             kept[peer] = number
-            since_s, _, _ = self._in_force.get(number, (time_s + SILENT_S, "", None))
+            since_s = self._in_force_s.get(number, math.inf)
             if since_s > time_s + SLACK_S and self._has_all_of(number[0], time_s):
                 yield f"{peer} kept the links of {number[0]}.{number[1]} at {time_s:.2f} s, which was not in force"
 
