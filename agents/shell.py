@@ -43,9 +43,6 @@ MAXIMUM_OPERATORS: Final = 64
 MAXIMUM_KEYS: Final = 1024
 """Keys remembered at a time: those of operators are without end."""
 
-_address: Final = lru_cache(maxsize=1024)(parse)
-"""The same few keys come again and again."""
-
 Refusal: TypeAlias = str
 """Why a publication was not heard: it is foreign, malformed, impersonated, misplaced or stale, or of a stranger."""
 
@@ -55,7 +52,7 @@ _NOTHING: Final = (-1, -1)
 
 def read(publication: Received) -> Heard | Refusal:
     """The message of a publication, or what is wrong with it whoever hears it."""
-    address = _address(publication.key)
+    address = parse(publication.key)
     if address is None:
         return "foreign"
     try:
@@ -178,7 +175,7 @@ class PeerShell:
 
     def _listen(self, key: str) -> Address | None:
         """The address of a key that has not been looked at yet, if what is under it is for this peer."""
-        address = _address(key)
+        address = parse(key)
         kind, to = (address.kind, address.to) if address is not None else route(key)
         if kind not in self._role.hears or to not in ("", self._name):
             return None  # most of the traffic: not worth a closer look

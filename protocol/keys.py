@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 
 VERSION = "v1"
 OPERATOR = "operator"
@@ -55,6 +56,7 @@ def tokens(team: str) -> str:
     return f"{team}/{VERSION}/*/{ALIVE}"
 
 
+@lru_cache(maxsize=1024)  # the same few keys come again and again
 def parse(key: str) -> Address | None:
     """Address of a key, or None if it is not one of ours."""
     chunks = key.split("/")

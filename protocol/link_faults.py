@@ -17,7 +17,6 @@ import mmap
 import threading
 import time
 from collections.abc import Sequence
-from functools import lru_cache
 from pathlib import Path
 from random import Random
 from typing import Final
@@ -36,9 +35,6 @@ TOKEN_S: Final = 1.0
 
 LOOK_S: Final = 0.05
 """How often a peer looks whose token it should see."""
-
-_address: Final = lru_cache(maxsize=1024)(keys.parse)
-"""The same few keys come again and again."""
 
 
 class LinkTable:
@@ -109,7 +105,7 @@ class LinkFilter:
         """Take an event of the bus. Any thread."""
         match event:
             case Received(key):
-                address = _address(key)
+                address = keys.parse(key)
                 lost = 0 if address is None or address.operator else self._lost(address.speaker)
                 if lost == 0 or (lost < CUT and self._chance.random() * CUT >= lost):
                     self._forward(event)
