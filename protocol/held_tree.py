@@ -24,7 +24,7 @@ class HeldTree:
         self.proposal: TreeProposal | None = None
         """The open proposal, as far as it knows."""
         self.latest: Topology | None = None
-        """The last word that was taken."""
+        """The last word heard of who is obeyed, also if it was not taken because a tree in it is none."""
         self._name = name
         self._views: dict[str, LinkView] = {}
         self._confirmation: Confirmation | None = None
