@@ -29,6 +29,7 @@ from agents.records import AnyRecord, Decision, Ordered, Track
 from launcher.fault_timetable import Fault, Kill, Loss, Partition, Pause, Timetable, write_timetable
 from launcher.reigns import Reigns, find_reigns
 from launcher.review import read_records
+from launcher.run_folder import RunFolder
 
 Records = list[tuple[float, str, AnyRecord]]
 
@@ -120,9 +121,10 @@ def run(folder: Path, name: str, faults: Sequence[Fault], duration_s: float, see
     (folder / f"{name}.txt").write_text(done.stdout + done.stderr)
     if done.returncode not in (0, 1):
         raise RuntimeError(f"the run did not take place:\n{done.stdout[-2000:]}{done.stderr[-2000:]}")
-    records = read_records(folder / "runs" / name / "run.rrd")
-    metrics = json.loads((folder / "runs" / name / "metrics.json").read_text())
-    return Run(records, find_reigns(records), metrics)
+    files = RunFolder(folder / "runs" / name)
+    records = read_records(files.recording)
+    metrics = json.loads((files.path / "metrics.json").read_text())
+    return Run(records, find_reigns(records, files.read_mission().epoch_unix_s), metrics)
 
 
 def lose_leaders(outcome: Outcome, run_team: Callable[[Sequence[Fault], float], Run], trials: int) -> None:
