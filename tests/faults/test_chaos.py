@@ -22,6 +22,15 @@ MISSIONS = 10
 RETREATING = 33
 
 
+def is_told_by_records(seed: int) -> bool:
+    """Whether a recording can be judged: clocks are alike, and no epoch begins again."""
+    faults = draw_case(seed, (2, 3), (12, 16)).faults
+    return not any(isinstance(fault, Clock) or (isinstance(fault, Kill) and fault.disk == "lost") for fault in faults)
+
+
+RECORDED = [seed for seed in range(1000, 1022) if is_told_by_records(seed)]
+
+
 @pytest.mark.parametrize("first", range(1000, 1200, MISSIONS))
 def test_no_rule_is_broken(first: int) -> None:
     """Small teams, whose missions cost little."""
@@ -31,14 +40,12 @@ def test_no_rule_is_broken(first: int) -> None:
         assert broken is None, f"mission {seed}: {broken}\n{write_case(case)}\n{run_chaos(case).trace()}"
 
 
-@pytest.mark.parametrize("seed", range(1000, 1010))
+@pytest.mark.parametrize("seed", RECORDED)
 def test_what_is_recorded_breaks_no_rule(seed: int) -> None:
     """By recordings, of which less is known, the missions are judged as in the simulation."""
-    case = draw_case(seed, (2, 3), (12, 16))
-    verdict = run_chaos(case)
+    verdict = run_chaos(draw_case(seed, (2, 3), (12, 16)))
     assert verdict.broken is None, f"mission {seed}: {verdict.broken}"
-    if not any(isinstance(fault, Clock) or (isinstance(fault, Kill) and fault.disk == "lost") for fault in case.faults):
-        assert find_reigns(verdict.history, 0.0).broken == (), "what was recorded breaks no rule, either"
+    assert find_reigns(verdict.history, 0.0).broken == (), "what was recorded breaks no rule, either"
 
 
 def test_the_missions_are_hard() -> None:
