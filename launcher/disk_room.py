@@ -18,6 +18,9 @@ TAKEN_B_S: Final = 15e3
 LEAST_B: Final = 5e6
 """For everything else: map, logs, promises, and what merging needs."""
 
+NEARLY_FULL_B: Final = 1e6
+"""With less than this left somebody is told."""
+
 BEGINNING_S: Final = 60.0
 """There must be room for so much of a run at least."""
 
@@ -65,7 +68,7 @@ class RoomWatch:
     def look(self) -> None:
         """Look once."""
         free_b = shutil.disk_usage(self._folder).free
-        if free_b < LEAST_B / 5 and not self._said:
+        if free_b < NEARLY_FULL_B and not self._said:
             self._said = True
             self._say(
                 f"only {_megabytes(free_b)} left on the disk of {self._folder}: make room, or recordings end, and "
