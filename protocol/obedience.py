@@ -3,9 +3,9 @@
 Clocks of different machines share no zero, so that nobody can read the age of an order off a time stamp. Instead every
 peer says *marks*, one with each vote, and remembers when. A leader's :class:`~protocol.messages.Warrant` brings back
 the latest mark that it had heard of each peer, and says how much of its lease was left. The hearer counts that rest
-from when it *said* the mark. The order was given after that, so that this ends no later than the leader's lease,
-however long the order was on its way, by all clocks within :data:`protocol.ballot.CLOCK_DRIFT`. Hence at any moment
-all who obey anybody obey one and the same leader.
+from when it *said* the mark. The order was given after that, so that this ends before any other peer can lead, however
+long the order was on its way, by all clocks within :data:`protocol.ballot.CLOCK_DRIFT`. Hence at any moment all who
+obey anybody obey one and the same leader.
 
 A mark that the leader has had for a while was said before that while, so that the rest may be counted from when the
 leader *heard* it. Two clocks measure that longer time, and :data:`~protocol.ballot.CAUTION` covers what they differ by.

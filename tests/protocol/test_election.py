@@ -258,14 +258,20 @@ DRIFTS = st.sampled_from([1.0 - CLOCK_DRIFT, 1.0, 1.0 + CLOCK_DRIFT])
 def test_nobody_obeys_until_the_voters_are_free(
     said_s: float, heard_after_s: float, given_after_s: float, leader: float, hearer: float
 ) -> None:
-    """By true time, since a majority was asked that voted after that: it is bound for a lease by its fastest clock."""
+    """By true time, since a majority was asked that voted after that: it is bound for a lease by its fastest clock.
+
+    What the age of a mark makes longer ends with the leader's lease.
+    """
     given_s = said_s + heard_after_s + given_after_s
     lease_s = CAUTION * LEASE_S - leader * given_s
     assume(given_s >= 0.0 and lease_s > 0.0)
     obedience = Obedience("robot1", 0, LEASE_S, None)
-    heard = LastHeard(peer="robot1", mark=obedience.mark(hearer * said_s), age_s=leader * given_after_s)
+    age_s = leader * given_after_s
+    heard = LastHeard(peer="robot1", mark=obedience.mark(hearer * said_s), age_s=age_s)
     obedience.heed(reign(1), Warrant(lease_s=lease_s, marks=(heard,)), hearer * said_s)
     assert obedience.until_s / hearer <= LEASE_S / (1.0 + CLOCK_DRIFT)
+    if CAUTION * (lease_s + age_s) > lease_s:
+        assert obedience.until_s / hearer <= CAUTION * LEASE_S / leader + 1e-9
 
 
 def test_orders_that_are_not_taken() -> None:
