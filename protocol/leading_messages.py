@@ -39,9 +39,9 @@ class LastHeard(msgspec.Struct, frozen=True, kw_only=True):
 class Warrant(msgspec.Struct, frozen=True, kw_only=True):
     """How long what a leader says may be obeyed; each hearer judges on its own clock how old it is.
 
-    Obey for ``lease_s`` from when you said the mark of yours that is in ``marks``, and not at all without one of this
-    incarnation. The leader had heard that mark before it spoke, so that delay makes orders run out sooner, not later.
-    Nine tenths of ``lease_s`` and the mark's ``age_s`` together will do as well, if that is longer.
+    Obey for nine tenths of ``lease_s`` and the mark's ``age_s`` together from when you said the mark of yours that is
+    in ``marks``, and not at all without one of this incarnation. The leader had heard that mark ``age_s`` before it
+    spoke, so that delay makes orders run out sooner, not later.
     """
 
     lease_s: Seconds

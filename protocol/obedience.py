@@ -2,13 +2,12 @@
 
 Clocks of different machines share no zero, so that nobody can read the age of an order off a time stamp. Instead every
 peer says *marks*, one with each vote, and remembers when. A leader's :class:`~protocol.messages.Warrant` brings back
-the latest mark that it had heard of each peer, and says how much of its lease was left. The hearer counts that rest
-from when it *said* the mark. The order was given after that, so that this ends before any other peer can lead, however
-long the order was on its way, by all clocks within :data:`protocol.ballot.CLOCK_DRIFT`. Hence at any moment all who
-obey anybody obey one and the same leader.
-
-A mark that the leader has had for a while was said before that while, so that the rest may be counted from when the
-leader *heard* it. Two clocks measure that longer time, and :data:`~protocol.ballot.CAUTION` covers what they differ by.
+the latest mark that it had heard of each peer and for how long it has had it, and says how much of its lease was left.
+From when the leader heard the mark it was that age and that rest until its lease ends; the hearer counts both from when
+it *said* the mark, which was earlier. Two clocks measure that time, and :data:`~protocol.ballot.CAUTION` covers what
+they differ by. So nobody obeys an order when the lease has ended that it was given in, however long it was on its way,
+by all clocks within :data:`protocol.ballot.CLOCK_DRIFT`. Hence at any moment all who obey anybody obey one and the same
+leader.
 """
 
 from __future__ import annotations
@@ -135,6 +134,6 @@ class Obedience:
     def _end_s(self, warrant: Warrant) -> float:
         for heard in warrant.marks:
             if heard.peer == self._name:
-                rest_s = max(warrant.lease_s, CAUTION * (warrant.lease_s + heard.age_s))
-                return self._said_s.get(heard.mark, -math.inf) + min(rest_s, self._most_s)
+                rest_s = min(CAUTION * (warrant.lease_s + heard.age_s), self._most_s)
+                return self._said_s.get(heard.mark, -math.inf) + rest_s
         return -math.inf

@@ -119,7 +119,7 @@ def test_the_record_says_when_obedience_ended_however_late_this_peer_looks() -> 
     world = World()
     world.follow()
     until_s = world.part.obeyed_until_s
-    assert until_s == pytest.approx(0.8)
+    assert until_s == pytest.approx(0.72)
     world.now_s = 5.0  # it hung
     world.give(Woken((0.0, 0.0)))
     (ended,) = [office.obeyed_until_s for office in world.offices if office.obeyed_until_s is not None]

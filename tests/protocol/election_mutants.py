@@ -13,7 +13,7 @@ from protocol.messages import Reign, Warrant
 from protocol.obedience import Obedience, Refusal
 from protocol.roster import Roster
 from protocol.voter import Voter
-from tests.protocol.election_exploration import NEVER_S, Bounds, ExploredElection
+from tests.protocol.election_exploration import Bounds, ExploredElection
 
 SLOW, RIGHT, FAST = 0.95, 1.0, 1.05
 TWO_STAND = Bounds(steps=2, candidacies=2, rounds=(1, 1, 0), refusals=False, rates=(SLOW, RIGHT, FAST))
@@ -31,7 +31,8 @@ LEASE_JUST_OVER = Bounds(
     heeding=("robot2",),
     steps_in_lease=10 / 9,
 )
-"""After one step the leader's lease is over by its own fast clock, and not by the slow one of the robot that obeys."""
+"""After one step the leader's lease is over by its own fast clock, and would not be by the slow one of the robot that
+obeys, if that counted the whole of it."""
 
 
 class Mutant(ExploredElection):
@@ -188,16 +189,6 @@ class ReusesAnEpoch(Mutant):
     def _withdraw(self, now_s: float) -> None:
         super()._withdraw(now_s)
         self._highest_epoch -= 1
-
-
-class WithdrawsFromOffice(Mutant):
-    """A leader whose lease has ended gives the promises back at once."""
-
-    bounds = LEASE_JUST_OVER
-
-    def _leave_office(self, reason: str) -> None:
-        self._withdraw(NEVER_S)
-        super()._leave_office(reason)
 
 
 class CountsFromArrival(Mutant):
