@@ -30,10 +30,10 @@ takeover: $(READY)
 
 # Ten thousand missions in virtual time in which much goes wrong, and 200 with the full planner on the packaged maps.
 chaos: $(READY)
-	$(BIN)/python -m tests.campaigns.chaos --missions 10000 --real 200
+	$(BIN)/python -m tests.campaigns.chaos --missions 10000 --ranged 300 --real 200
 
 chaos-short: $(READY)
-	$(BIN)/python -m tests.campaigns.chaos --missions 300 --real 10
+	$(BIN)/python -m tests.campaigns.chaos --missions 300 --ranged 20 --real 10
 
 # A million inputs of our own, then as many of atheris, which is no dependency: without it the second half is left out.
 fuzz: $(READY)

@@ -1,6 +1,6 @@
 """Campaign: missions in which much goes wrong, by the thousand, and some with the full planner on real maps.
 
-    python -m tests.campaigns.chaos --missions 10000 --real 200
+    python -m tests.campaigns.chaos --missions 10000 --ranged 300 --real 200
     python -m tests.campaigns.chaos --case runs/chaos/light-17.toml
 
 Every mission is judged after every event (:mod:`launcher.invariants`), and by how soon it recovers from its last fault.
@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Final
 
 from tests.faults.chaos import run_chaos
-from tests.faults.chaos_mission import ChaosCase, draw_case, read_case, write_case
+from tests.faults.chaos_mission import ChaosCase, draw_case, draw_ranged_case, read_case, write_case
 from tests.faults.real_team import draw_real_case
 from tests.faults.shrinking import shrink
 
@@ -33,7 +33,7 @@ FOLDER: Final = Path("runs/chaos")
 COLLECTED_AFTER: Final = (50_000, 20, 100)
 """Thresholds of the garbage collector: a mission makes little garbage in cycles, and to look for it takes an eighth."""
 
-DRAW: Final = {"light": draw_case, "real": draw_real_case}
+DRAW: Final = {"light": draw_case, "ranged": draw_ranged_case, "real": draw_real_case}
 
 
 @dataclass(frozen=True)
@@ -122,6 +122,7 @@ def main() -> int:
     """Run the missions, or one case; 1 if a rule was broken."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--missions", type=int, default=1000, help="with the light planner")
+    parser.add_argument("--ranged", type=int, default=0, help="the same where ranges alone tell where the agent is")
     parser.add_argument("--real", type=int, default=0, help="missions with the full planner on packaged maps")
     parser.add_argument("--seed", type=int, default=0, help="of the first mission")
     parser.add_argument("--processes", type=int, default=2)
@@ -133,7 +134,7 @@ def main() -> int:
         return int(verdict.broken is not None)
     begun_s = time.monotonic()
     broken: list[Result] = []
-    for kind, count in (("light", options.missions), ("real", options.real)):
+    for kind, count in (("light", options.missions), ("ranged", options.ranged), ("real", options.real)):
         if count:
             results = run_all([(kind, seed) for seed in range(options.seed, options.seed + count)], options.processes)
             report(results)

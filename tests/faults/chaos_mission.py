@@ -168,6 +168,11 @@ def draw_case(
     )  # fmt: skip
 
 
+def draw_ranged_case(seed: int, robots: tuple[int, int] = (3, 7), duration_s: tuple[int, int] = (30, 60)) -> ChaosCase:
+    """The same with an agent that tells nobody where it is: ranges, and an estimate that all share."""
+    return msgspec.structs.replace(draw_case(seed, robots, duration_s, clocks=False), announces=False)
+
+
 def draw_clocks(chance: Random, voters: Sequence[str]) -> list[Fault]:
     """Clocks of other zeros, and of rates up to the limits that the election allows."""
     rates = (1.0 - CLOCK_DRIFT, 1.0, 1.0 + CLOCK_DRIFT)
