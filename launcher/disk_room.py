@@ -66,8 +66,11 @@ class RoomWatch:
         self._said = False
 
     def look(self) -> None:
-        """Look once."""
-        free_b = shutil.disk_usage(self._folder).free
+        """Look once. A folder that is gone has no disk."""
+        try:
+            free_b = shutil.disk_usage(self._folder).free
+        except OSError:
+            return
         if free_b < NEARLY_FULL_B and not self._said:
             self._said = True
             self._say(

@@ -40,8 +40,8 @@ MOST_KEPT: Final[Mapping[type[object], int]] = {
     PeerShell: 30_000,
     Inbox: 10_000,
 }
-"""Things in the containers of a mind's part, of a whole peer, and of what waits for one that is paused; several times
-what healthy teams keep."""
+"""Things in the containers of two parts of a mind, of a whole peer, and of what waits for one that is paused; several
+times what healthy teams keep."""
 
 JUDGED_KINDS: Final = frozenset({"deployment", "topology", "auction", "confirmation", "state", "vote_request"})
 
@@ -105,9 +105,10 @@ class Invariants:
 
     def _look_at_memory(self) -> None:
         for peer in self._team.peers.values():
-            for kind, most in MOST_KEPT.items():
-                kept = {PeerShell: peer.shell, Inbox: peer.inbox}.get(kind) or peer.part(kind)
-                if kept is not None and (count := count_kept(kept)) > most:
+            parts: list[tuple[type[object], object]] = [(PeerShell, peer.shell), (Inbox, peer.inbox)]
+            parts += [(kind, peer.part(kind)) for kind in (Allegiance, SharedEstimate)]
+            for kind, kept in parts:
+                if kept is not None and (count := count_kept(kept)) > MOST_KEPT[kind]:
                     raise Violation("memory is bounded", f"{kind.__name__} of {peer.name} keeps {count} things")
         self._team.time.call_at(self._team.time.now_s + COUNT_S, self._look_at_memory)
 

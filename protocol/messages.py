@@ -205,7 +205,8 @@ STANDING_KINDS: Final = frozenset(
 """Kinds that are said again and again, so that who joins late hears them soon; who asks is answered at once."""
 
 STANDS_FOR_S: Final = 2.0
-"""What was said so long ago, and not again, does not stand any more: each kind is repeated at least once a second."""
+"""What was said so long ago, and not again, does not stand any more: each kind is repeated once a second or more often,
+unless a mission sets its rates lower than that."""
 
 
 class Envelope(msgspec.Struct, frozen=True, kw_only=True):

@@ -11,7 +11,7 @@ from agents.records import Office
 from launcher.fault_timetable import Clock, Kill, Loss, Partition
 from launcher.reigns import find_reigns
 from tests.faults.chaos import run_chaos
-from tests.faults.chaos_mission import LONGEST_FAULT_S, ChaosCase, draw_case, read_case, write_case
+from tests.faults.chaos_mission import LONGEST_FAULT_S, ChaosCase, draw_case, draw_ranged_case, read_case, write_case
 from tests.faults.chaos_mutants import MUTANTS
 from tests.faults.mutant_cases import CASES, FURTHER
 from tests.faults.shrinking import shrink
@@ -38,6 +38,13 @@ def test_no_rule_is_broken(first: int) -> None:
         case = draw_case(seed, (2, 4), (12, 16))
         broken = run_chaos(case, keep=False).broken
         assert broken is None, f"mission {seed}: {broken}\n{write_case(case)}\n{run_chaos(case).trace()}"
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_no_rule_is_broken_where_ranges_alone_tell_where_the_agent_is(seed: int) -> None:
+    case = draw_ranged_case(seed, (2, 3), (12, 14))
+    broken = run_chaos(case, keep=False).broken
+    assert broken is None, f"mission {seed}: {broken}\n{write_case(case)}\n{run_chaos(case).trace()}"
 
 
 @pytest.mark.parametrize("seed", RECORDED)
