@@ -28,7 +28,8 @@ bench: $(READY)
 takeover: $(READY)
 	$(BIN)/python -m tests.campaigns.takeover
 
-# Ten thousand missions in virtual time in which much goes wrong, and 200 with the full planner on the packaged maps.
+# Ten thousand missions in virtual time in which much goes wrong, 300 in which ranges alone tell where the agent is, and
+# 200 with the full planner on the packaged maps.
 chaos: $(READY)
 	$(BIN)/python -m tests.campaigns.chaos --missions 10000 --ranged 300 --real 200
 
