@@ -23,10 +23,10 @@ BACK_S = LEADERLESS_S + 0.65 + 10.0
 """When its last orders have run out, and ``retreat_after_s`` has passed."""
 
 
-def begin(*faults: Fault) -> Stage:
+def begin(*faults: Fault, dead: tuple[Kill, ...] = FEWER) -> Stage:
     """With all invariants looked for: also that nobody goes back out of turn, or moves otherwise without a leader."""
-    stage = Stage(3, *FEWER, *faults)
-    Invariants(stage.mission, stage.team, Timetable(faults=(*FEWER, *faults)))
+    stage = Stage(3, *dead, *faults)
+    Invariants(stage.mission, stage.team, Timetable(faults=(*dead, *faults)))
     return stage
 
 
@@ -91,8 +91,10 @@ def test_all_stand_while_one_of_them_is_silent() -> None:
 
 
 def test_a_leader_that_comes_back_begins_afresh_from_where_they_are() -> None:
+    """The others died where they began: a process that begins anew has not heard where else they may be."""
     again_s = BACK_S + 1.5
-    stage = begin(Kill(at_s=LEADERLESS_S, for_s=again_s - LEADERLESS_S, who="base"))
+    dead = tuple(Kill(at_s=0.0, who=kill.who) for kill in FEWER)
+    stage = begin(Kill(at_s=LEADERLESS_S, for_s=again_s - LEADERLESS_S, who="base"), dead=dead)
     run(stage, again_s)
     back = [body(stage, name).progress for name in GROUP]
     assert all(progress is not None and progress.retreat is not None for progress in back)
