@@ -97,7 +97,7 @@ class Casting:
         orders, collection = StandingOrders(allegiance), Collection(allegiance, mission.tracked_agent.name)
         body: Robot | BaseStation
         if entry.role == "robot":
-            robot = body = Robot(mission, entry.name, self._judge, allegiance, orders, now_s)
+            robot = body = Robot(mission, entry.name, self._judge, allegiance, orders, collection, now_s)
         else:
             robot, body = None, BaseStation(mission, self._environment, orders, collection, now_s)
         knowing: list[Part] = [allegiance, orders, collection]

@@ -83,6 +83,11 @@ class Collection:
             return None
         return known.body
 
+    def heard_at(self, robot: str) -> Point | None:
+        """Where a robot has said last that it is, whatever has become of it; None: it has not been heard."""
+        known = self._known.get(robot)
+        return None if known is None else known.body.position
+
     def intent(self) -> Intent | None:
         """What the agent says of itself, as :meth:`body`."""
         body = self.body(self._agent)

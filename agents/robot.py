@@ -17,7 +17,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import Final, Literal
+from itertools import pairwise
+from typing import Final, Literal, Protocol
 
 from msgspec import structs
 
@@ -25,7 +26,7 @@ from agents.allegiance import AT_ONCE_S, Allegiance
 from agents.certificate_judge import Judge
 from agents.driver import patience_s
 from agents.mission import Mission
-from agents.path_follower import ASTRAY_M, STANDING, Leg
+from agents.path_follower import ASTRAY_M, STANDING, Leg, distance_off
 from agents.records import LogLine
 from agents.rhythm import EARLY_S
 from agents.role import Compute, Drive, Effect, Event, Heard, JobDone, Record, Woken
@@ -47,6 +48,13 @@ SILENT_STATES: Final = 5
 """… within so many states, if that is longer."""
 
 
+class Others(Protocol):
+    """What is known of other robots."""
+
+    def heard_at(self, robot: str) -> Point | None:
+        """Where it has said last that it is; None: it has not been heard."""
+
+
 class Robot:
     """Obeys the deployments of whoever leads, for as long as it is led: a part of the robot's mind.
 
@@ -60,19 +68,29 @@ class Robot:
         judge: says what is wrong with a motion (:func:`agents.certificate_judge.certificate_judge`).
         allegiance: says until when orders are in force.
         orders: those of the leader, this robot or another.
+        others: where they have said that they are.
         now_s: the present time.
     """
 
     hears = frozenset({"state"})
 
     def __init__(
-        self, mission: Mission, name: str, judge: Judge, allegiance: Allegiance, orders: StandingOrders, now_s: float
+        self,
+        mission: Mission,
+        name: str,
+        judge: Judge,
+        allegiance: Allegiance,
+        orders: StandingOrders,
+        others: Others,
+        now_s: float,
     ) -> None:
         self.state: State | None = None
         """What it has said of itself last, or would say."""
         self._name = name
         self._judge = judge
-        self._allegiance, self._standing = allegiance, orders
+        self._allegiance, self._standing, self._others = allegiance, orders, others
+        self._starts = {robot.name: robot.start for robot in mission.robots if robot.name != name}
+        self._apart_m = 2.0 * mission.robot_radius_m
         self._follower = StageFollower(name, mission.robot_speed_m_s)
         self._patience_s = patience_s(mission.control_hz)
         self._retreat_after_s = mission.retreat_after_s
@@ -226,7 +244,11 @@ class Robot:
             if (off_m := self._follower.astray_m(position)) > ASTRAY_M:
                 self._refuse(epoch, motion, f"{self._name} is {off_m:.2f} m off its way")
             return
-        objection = self._follower.object_to(epoch, motion, position) or self._verdict(epoch, motion)
+        objection = (
+            self._follower.object_to(epoch, motion, position)
+            or self._object_to_strays(motion)
+            or self._verdict(epoch, motion)
+        )
         if objection:
             self._refuse(epoch, motion, objection)
         elif self._judging is None:
@@ -234,6 +256,21 @@ class Robot:
             # What has been released does not matter to the judge, who remembers what was asked before.
             asked = structs.replace(motion, released=motion.first_stage - 1)
             self._effects.append(Compute(CERTIFICATE, self._judge, (asked,)))
+
+    def _object_to_strays(self, motion: Motion) -> str:
+        """Why its way is not free, by what this robot has heard and a leader whose process began anew has not.
+
+        Such a leader takes a robot that is not there to be where it started, and it may have died elsewhere.
+        """
+        ways = {way.member: way for way in motion.ways}
+        for robot, start in self._starts.items():
+            known = ways.get(robot)
+            place = self._others.heard_at(robot)
+            if place is None or (known is not None and (known.scheduled or set(known.waypoints) != {start})):
+                continue
+            if any(distance_off(a, b, place) < self._apart_m for a, b in pairwise(ways[self._name].waypoints)):
+                return f"{robot} is not at its start, but was heard at ({place[0]:.2f}, {place[1]:.2f}), in the way"
+        return ""
 
     def _accept_judged(self, epoch: int, motion: Motion, position: Point) -> None:
         """Follow what was judged well, if it is still of the plan ordered; a later revision is accepted after it."""

@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec import structs
 
+from agents.collection import Collection
 from agents.driver import patience_s
 from agents.mind import Mind
 from agents.mission import Mission
@@ -110,7 +111,14 @@ def life(mission: Mission) -> Life:
 
 def make_robot(mission: Mission) -> Mind:
     allegiance, orders = sworn("robot1")
-    return Mind([orders, Robot(mission, "robot1", judge, allegiance, orders, 0.0)])
+    return Mind(
+        [
+            orders,
+            Robot(
+                mission, "robot1", judge, allegiance, orders, Collection(allegiance, mission.tracked_agent.name), 0.0
+            ),
+        ]
+    )
 
 
 def test_waits_and_says_so_until_it_hears_orders(life: Life) -> None:

@@ -112,3 +112,11 @@ def test_a_robot_that_is_cut_off_alone_holds() -> None:
     stage.run(BACK_S + 5.0)
     assert stage.team.peers["robot1"].place == stands
     assert said(stage, "robot1")[-1].endswith("stands until robot2 would too")
+
+
+def test_robots_refuse_a_way_through_one_that_the_leader_cannot_know_to_be_there() -> None:
+    """The base station begins anew, and has not heard where the dead robots came to before they died."""
+    again_s = BACK_S + 1.5
+    stage = begin(Kill(at_s=LEADERLESS_S, for_s=again_s - LEADERLESS_S, who="base"))
+    run(stage, again_s + 8.0)
+    assert any("but was heard at" in text for name in GROUP for text in said(stage, name))
