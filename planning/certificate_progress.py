@@ -7,8 +7,8 @@ member has a piece of its path, and may be anywhere on it whatever the others do
 - pieces of members with bodies keep their distance from each other, all of one from all of the other;
 - the links that hold for all places on both pieces join the network.
 
-An unscheduled member may be anywhere on its whole path in every window. The nominal times have to keep the rule of
-progress too; then whatever happens on the nominal clock is one of these cases.
+An unscheduled member may be anywhere on its whole path in every window; two of them are not held against each other, as
+no schedule can keep them apart. The nominal times have to keep the rule of progress too; then whatever happens on the nominal clock is one of these cases.
 """
 
 from __future__ import annotations
@@ -110,6 +110,8 @@ def _check_collisions(schedule: Schedule, windows: _Windows, depth: float) -> It
     found = find_distances(windows.points, windows.first, windows.last, windows.bounds, schedule.radii_m)
     separations = schedule.radii_m[:, None] + schedule.radii_m
     near = found[..., 0] < separations[:, :, None] - depth
+    free = np.array([name in schedule.unscheduled for name in schedule.members])
+    near[np.ix_(free, free)] = False
     for i, j in np.argwhere(near.any(axis=2)):
         one, other = schedule.members[i], schedule.members[j]
         for window, until in _runs(near[i, j]):

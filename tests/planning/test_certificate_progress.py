@@ -103,6 +103,15 @@ def test_the_unscheduled_may_be_anywhere_all_the_time() -> None:
         certify(schedule, PILLAR, ends=("robot",))
 
 
+def test_two_unscheduled_are_not_held_against_each_other() -> None:
+    """Robots that were lost, whose ways cross: nobody can keep them apart, and the others must be able to go on."""
+    ways = [TimedPath.standing((1, 1)), TimedPath([(1, 7), (7, 7)], [0, 6]), TimedPath([(7, 7), (1, 7)], [0, 6])]
+    stages = [[0] * 5, [0, 0, 0, 0, 1], [0, 0, 0, 0, 1]]
+    names = ["robot", "lost", "lost too"]
+    assert certify(Schedule(names, ways, 0.2, 1.0, stages, names[1:]), PILLAR, links=[]).valid
+    assert not certify(Schedule(names, ways, 0.2, 1.0, stages, names[2:]), PILLAR, links=[]).valid
+
+
 @pytest.mark.parametrize("names", [("robot", 2), (0, -1), ("robot", "walker")])
 def test_rows_and_names_that_do_not_exist_are_refused(names: tuple[str | int, str | int]) -> None:
     schedule = Schedule(["robot", "agent"], [TimedPath.standing((1, 1))] * 2, 0.0)
