@@ -8,7 +8,8 @@ member has a piece of its path, and may be anywhere on it whatever the others do
 - the links that hold for all places on both pieces join the network.
 
 An unscheduled member may be anywhere on its whole path in every window; two of them are not held against each other, as
-no schedule can keep them apart. The nominal times have to keep the rule of progress too; then whatever happens on the nominal clock is one of these cases.
+no schedule can keep them apart. The nominal times have to keep the rule of progress too; then whatever happens on the
+nominal clock is one of these cases.
 """
 
 from __future__ import annotations
