@@ -158,13 +158,16 @@ def test_the_seed_decides_and_not_the_hashes_of_python() -> None:
     assert len(digests) == 1
 
 
-@pytest.mark.parametrize(("loss", "least"), [(0.1, 0.95), (0.3, 0.9)])
-def test_a_chain_stands_though_messages_are_lost(loss: float, least: float) -> None:
-    """At 0.3 the share is 0.87 to 1 in six missions that differ by their seed, 0.95 in the mean."""
-    metrics = measure(simulate(around_the_corner(), CORNER, loss=loss), CORNER)
-    assert metrics.errors == 0
-    assert metrics.since_first_deployment is not None
-    assert metrics.since_first_deployment.chain_connected > least
+@pytest.mark.parametrize(("loss", "seeds", "least"), [(0.1, 1, 0.95), (0.3, 6, 0.93)])
+def test_a_chain_stands_though_messages_are_lost(loss: float, seeds: int, least: float) -> None:
+    """At 0.3 single missions differ much, 0.87 to 1, by what is lost when; so the mean of several is judged."""
+    shares = []
+    for seed in range(3, 3 + seeds):
+        metrics = measure(simulate(structs.replace(around_the_corner(), seed=seed), CORNER, loss=loss), CORNER)
+        assert metrics.errors == 0
+        assert metrics.since_first_deployment is not None
+        shares.append(metrics.since_first_deployment.chain_connected)
+    assert np.mean(shares) > least, shares
 
 
 def test_robots_that_hear_nothing_stay_where_they_are() -> None:
